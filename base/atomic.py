@@ -66,12 +66,12 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
 
 
 NOT_REGULAR = "it is not a regular file; remove it"
-PATIENCE = 0.3
+REPLACE_TIMEOUT = 0.3
 """The longest wait, s, for another program that has the file open on Windows, such as one that looks for viruses."""
 
 
 def _replace(new: Path, old: Path) -> None:
-    until = time.monotonic() + PATIENCE
+    until = time.monotonic() + REPLACE_TIMEOUT
     while True:
         try:
             os.replace(new, old)
@@ -119,17 +119,17 @@ def make_folder(folder: Path, mode: int = 0o777) -> None:
 
     Every maker of a folder calls it: the next one syncs only the names that it makes itself.
     """
-    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     try:
-        for each in reversed(made):
-            each.mkdir(mode, exist_ok=True)
+        for path in reversed(made):
+            path.mkdir(mode, exist_ok=True)
         folder.mkdir(mode, exist_ok=True)  # raises where a file has its name
-        for each in made:
-            sync_folder(each.parent)
+        for path in made:
+            sync_folder(path.parent)
     except OSError:
-        for each in made:
+        for path in made:
             with contextlib.suppress(OSError):  # another process uses it
-                each.rmdir()
+                path.rmdir()
         raise
 
 

@@ -87,5 +87,5 @@ def enter_in(line: str) -> re.Match[str] | None:
 
 def uncommented(line: str) -> str:
     """Return the line of a script without its comment: from a `#` at its head or after a blank, outside quotes."""
-    found = next((each for each in _SCRIPT.finditer(line) if each["comment"] is not None), None)
-    return (line[: found.start()] if found else line).strip(" \t")
+    match = next((comment for comment in _SCRIPT.finditer(line) if comment["comment"] is not None), None)
+    return (line[: match.start()] if match else line).strip(" \t")

@@ -21,7 +21,7 @@ NAME = re.compile(r"[a-z][a-z0-9_]*")
 Kinds = tuple[type[BaseException], ...]
 """Kinds of what a function may raise."""
 GUARD = "guarded_by"
-"""The attribute of a function of a feature by others with its `base.foreign.Guard`."""
+"""The attribute of a function of a feature by others with its `base.foreign.ForeignGuard`."""
 
 
 class Feature(NamedTuple):
@@ -41,7 +41,7 @@ class Feature(NamedTuple):
             return "name and meaning are texts"
         if type(self.adds) not in (tuple, list):  # one record without a comma behind it is a tuple, too
             return "adds is a tuple of records, as in (RECORD,)"
-        if not (isinstance(self.extras, Mapping) and all(isinstance(each, str) for each in self.extras.values())):
+        if not (isinstance(self.extras, Mapping) and all(isinstance(extra, str) for extra in self.extras.values())):
             return "extras is a mapping of names to names of modules"
         return ""
 

@@ -27,16 +27,16 @@ else:
 
     def other_writer(path: Path) -> str:
         """Who else can change a file, or put another one in its place, in words; empty: only its owner and root can."""
-        for each in places(path):
-            state = os.stat(each)
+        for place in places(path):
+            state = os.stat(place)
             if state.st_uid not in (0, os.geteuid()):
-                return f"account {_name(pwd.getpwuid, state.st_uid)}, who owns {each}"
+                return f"account {_name(pwd.getpwuid, state.st_uid)}, who owns {place}"
             if state.st_mode & stat.S_ISVTX:  # as /tmp: a file there is its owner's
                 continue
             if state.st_mode & stat.S_IWOTH:
-                return f"every account (mode {stat.S_IMODE(state.st_mode):o} of {each})"
+                return f"every account (mode {stat.S_IMODE(state.st_mode):o} of {place})"
             if state.st_mode & stat.S_IWGRP and (group := _shared_group(state.st_gid)):
-                return f"group {group} (mode {stat.S_IMODE(state.st_mode):o} of {each})"
+                return f"group {group} (mode {stat.S_IMODE(state.st_mode):o} of {place})"
         return ""
 
     def _shared_group(number: int) -> str:
@@ -47,7 +47,7 @@ else:
             own = pwd.getpwuid(os.geteuid()).pw_name
         except KeyError:
             return name
-        alone = number == os.getegid() and name == own and not [each for each in members if each != own]
+        alone = number == os.getegid() and name == own and not [member for member in members if member != own]
         return "" if alone or number == 0 else name
 
     def _name(find: Callable[[int], Sequence[Any]], number: int) -> str:

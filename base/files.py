@@ -20,13 +20,13 @@ from multidrop.base.errors import Diagnostic
 if TYPE_CHECKING:
     from pathlib import Path
 
-LARGEST = 1024 * 1024
+LARGEST_FILE = 1024 * 1024
 """Bytes of a script, a configuration, a macro or a cell; more than a person writes into one."""
-LARGEST_PROGRAM = 16 * LARGEST
+LARGEST_PROGRAM = 16 * LARGEST_FILE
 """Bytes of a program file, remarks included."""
 MOST_LINES = 20_000
 """Lines of a program file; no drive holds as many."""
-DEEPEST = 50
+DEEPEST_TABLES = 50
 """The deepest nesting of tables, arrays and dotted keys in TOML: a parser's time grows with it."""
 
 _OWN = re.compile(r"/dev/(stdin|fd/\d+)|/proc/self/fd/\d+")
@@ -47,7 +47,7 @@ class SourceLine:
     text: str
 
 
-def bytes_of(path: str | Path, largest: int = LARGEST) -> bytes:
+def bytes_of(path: str | Path, largest: int = LARGEST_FILE) -> bytes:
     """Read a regular file, or our own standard input by its name. Raises Diagnostic, also for one that is too large."""
     where = str(path) or '""'
     try:
@@ -65,7 +65,7 @@ def opened(path: str | Path) -> IO[bytes]:
     return open(path, "rb")
 
 
-def bounded(file: IO[bytes], where: str, largest: int = LARGEST) -> bytes:
+def bounded(file: IO[bytes], where: str, largest: int = LARGEST_FILE) -> bytes:
     """Read a stream to its end. Raises Diagnostic for one that is too large, and OSError."""
     data = file.read(largest + 1)
     if len(data) > largest:
@@ -150,8 +150,8 @@ def lines_of_text(text: str, _: object = None) -> tuple[str, ...]:
 def wrong_characters(lines: Iterable[str]) -> Iterator[tuple[int, int, str]]:
     """Name the first character of each line that no line may have: line and column from 1, and its name."""
     for number, line in enumerate(lines, 1):
-        if found := _WRONG.search(line):
-            yield number, found.start() + 1, named(found[0])
+        if match := _WRONG.search(line):
+            yield number, match.start() + 1, named(match[0])
 
 
 def named(character: str) -> str:
@@ -168,8 +168,8 @@ def lines_of(text: str, where: str = "") -> list[str]:
 
 def check_line(line: str, where: str = "", number: int = 1) -> None:
     """Raise Diagnostic for a character that no line may have."""
-    if found := _WRONG.search(line):
-        raise Diagnostic(f"{named(found[0])} in the line", _at(where, number), "delete it: lines end at LF or CR LF")
+    if match := _WRONG.search(line):
+        raise Diagnostic(f"{named(match[0])} in the line", _at(where, number), "delete it: lines end at LF or CR LF")
 
 
 def escaped_toml(text: str) -> str:
@@ -209,8 +209,8 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
     except RecursionError:
         raise Diagnostic("not TOML: brackets without end", where, "correct the line") from None
     except ValueError:  # a number with more digits than Python reads
-        if found := _LONG_NUMBER.search(text):
-            where = _at(where, text.count("\n", 0, found.start()) + 1)
+        if match := _LONG_NUMBER.search(text):
+            where = _at(where, text.count("\n", 0, match.start()) + 1)
         raise Diagnostic("not TOML: a number without end", where, "correct the line") from None
 
 
@@ -227,7 +227,7 @@ def toml_keys(text: str) -> Iterator[tuple[Way, int, bool]]:
             names = toml_names(head[2])
             if head[1]:
                 place = ".".join(names)
-                counts = {each: n for each, n in counts.items() if not each.startswith(f"{place}.")}
+                counts = {key_path: n for key_path, n in counts.items() if not key_path.startswith(f"{place}.")}
                 counts[place] = counts.get(place, 0) + 1
             here = tuple((name, counts.get(".".join(names[: n + 1]), 0)) for n, name in enumerate(names))
             yield here, number, False
@@ -241,17 +241,17 @@ def toml_names(dotted: str) -> list[str]:
 
 
 def _check_marks(text: str, where: str) -> None:
-    """Raise Diagnostic for brackets and dotted keys deeper than `DEEPEST`, without parsing.
+    """Raise Diagnostic for brackets and dotted keys deeper than `DEEPEST_TABLES`, without parsing.
 
     Also raises it for a comment that divides a number in groups of digits: `position = 51#200`.
     """
     brackets = dots = 0
-    for found in _TOML.finditer(text):
-        mark = found["mark"]
+    for match in _TOML.finditer(text):
+        mark = match["mark"]
         if mark is None:
-            if found[0].startswith("#") and behind_number(text, at := found.start()):
+            if match[0].startswith("#") and behind_number(text, at := match.start()):
                 before = text[text.rfind("\n", 0, at) + 1 : at]
-                if (divides := grouped_at(before + found[0], len(before))) is not None:
+                if (divides := grouped_at(before + match[0], len(before))) is not None:
                     line = _at(where, text.count("\n", 0, at) + 1)
                     raise Diagnostic(f"not TOML: {divides.why}", line, "put a blank before a comment")
             continue
@@ -263,9 +263,9 @@ def _check_marks(text: str, where: str) -> None:
             brackets = max(brackets - 1, 0)
         if mark not in ".[]":
             dots = 0
-        if brackets + dots > DEEPEST:
-            line = _at(where, text.count("\n", 0, found.start()) + 1)
-            raise Diagnostic(f"not TOML: nested deeper than {DEEPEST} levels", line, "flatten it")
+        if brackets + dots > DEEPEST_TABLES:
+            line = _at(where, text.count("\n", 0, match.start()) + 1)
+            raise Diagnostic(f"not TOML: nested deeper than {DEEPEST_TABLES} levels", line, "flatten it")
 
 
 def _at(where: str, line: int) -> str:

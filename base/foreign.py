@@ -25,10 +25,10 @@ from multidrop.base.isolation import LOG, OTHERS, at_once, takes_signals
 
 READ: Kinds = (Diagnostic, DriveError, TransportLost, BrokenPipeError)
 """What passes as it is: the errors that a person reads, and the end of the reader of standard output."""
-_calling: ContextVar[Guard | None] = ContextVar("calling", default=None)
+_calling: ContextVar[ForeignGuard | None] = ContextVar("calling", default=None)
 
 
-class Guard:
+class ForeignGuard:
     """Guards what one feature by others wrote. `name`: that of the feature."""
 
     def __init__(self, name: str) -> None:
@@ -70,9 +70,9 @@ class Guard:
             with self.calling(passes):
                 return self._result(function(*given, **named), passes)
 
-        found = awaited if iscoroutinefunction(function) else guarded
-        vars(found)[GUARD] = self
-        return found
+        wrapped = awaited if iscoroutinefunction(function) else guarded
+        vars(wrapped)[GUARD] = self
+        return wrapped
 
     def _result(self, found: Any, passes: Kinds) -> Any:
         if isinstance(found, GeneratorType):
@@ -82,7 +82,7 @@ class Guard:
         if isinstance(found, Awaitable):
             return self._awaited(found, passes)
         if type(found) is tuple:
-            return tuple(self.function(each, passes) if _is_function(each) else each for each in found)
+            return tuple(self.function(item, passes) if _is_function(item) else item for item in found)
         return found
 
     async def _awaited(self, work: Awaitable[Any], passes: Kinds) -> Any:
@@ -92,10 +92,10 @@ class Guard:
     @contextmanager
     def _entered(self, manager: AbstractContextManager[Any], passes: Kinds) -> Iterator[Any]:
         with self.calling(passes):
-            found = manager.__enter__()
+            entered = manager.__enter__()
         failure: BaseException | None = None
         try:
-            yield found
+            yield entered
         except BaseException as raised:
             failure = raised
             if not self._left(manager, raised, passes):
@@ -114,7 +114,7 @@ class Guard:
         if _is_function(value):
             return self.function(value, passes.get(name, ()))
         if isinstance(value, Mapping):
-            return {key: self.value(each, passes, key) for key, each in value.items()}
+            return {key: self.value(item, passes, key) for key, item in value.items()}
         return value
 
     def record(self, record: Any) -> Any:
@@ -125,19 +125,19 @@ class Guard:
         passes: Mapping[str, Kinds] = record.passes() if hasattr(record, "passes") else {}
         if isinstance(record, tuple) and hasattr(record, "_fields"):
             fields = zip(record._fields, record, strict=True)
-            return type(record)(*(self.value(each, passes, name) for name, each in fields))
+            return type(record)(*(self.value(item, passes, name) for name, item in fields))
         if not hasattr(record, "__dict__"):
             return record
         made = copy.copy(record)
         for name in dir(type(made)):
-            if not name.startswith("_") and _is_function(found := getattr(record, name)):
-                vars(made)[name] = self.function(found, passes.get(name, ()))
+            if not name.startswith("_") and _is_function(value := getattr(record, name)):
+                vars(made)[name] = self.function(value, passes.get(name, ()))
         return made
 
 
 def guarded(feature: Feature) -> Feature:
     """A feature by others with all its functions guarded."""
-    guard = Guard(feature.name)
+    guard = ForeignGuard(feature.name)
     return feature._replace(adds=tuple(map(guard.record, feature.adds)))
 
 

@@ -15,7 +15,7 @@ from multidrop.base.text import visible
 LOG = logging.getLogger("multidrop")
 OTHERS = "others"
 """The part of the log for features by others: what is in it is no defect of multidrop."""
-MOST = 100
+MOST_SAID_FAILURES = 100
 _said: set[str] = set()
 """The failures of features that were reported where no one keeps a log: an event comes ten times a second."""
 
@@ -23,7 +23,7 @@ _said: set[str] = set()
 def _report(what: str, failure: Exception) -> None:
     kept = LOG.hasHandlers()
     if isinstance(failure, Diagnostic) and not kept:  # it is for a person, without a traceback
-        if (text := str(failure)) not in _said and len(_said) < MOST:
+        if (text := str(failure)) not in _said and len(_said) < MOST_SAID_FAILURES:
             _said.add(text)
             LOG.error("%s", visible(text))
     elif not isinstance(failure, FeatureFailed):

@@ -47,10 +47,10 @@ OPERATIONS: tuple[str, ...] = (
 )
 """The modules that declare the core's own operations: each has a tuple `OPERATIONS`."""
 WHEEL = "multidrop"
-KEPT = "features.json"
+FEATURES_FILE = "features.json"
 
 
-class Entry(NamedTuple):
+class FeatureEntry(NamedTuple):
     """A feature that may be loaded. `place`: `MODULE:ATTRIBUTE`, or the path of a person's own file."""
 
     name: str
@@ -60,10 +60,10 @@ class Entry(NamedTuple):
     place: str
 
 
-class Failed(NamedTuple):
+class FailedFeature(NamedTuple):
     """A feature that cannot be loaded, and why."""
 
-    entry: Entry
+    entry: FeatureEntry
     why: str
 
     def __str__(self) -> str:
@@ -99,15 +99,15 @@ Verbs and commands (`/twin`, `program sweep`), options (`tui --twin`), schemes (
 (`[mqtt]`), the first words of forms that it adds to a verb (`/plot --to`), and functions of the Python API
 (`multidrop.read_rrd`).
 """
-_failed: dict[str, Failed] = {}
+_failed: dict[str, FailedFeature] = {}
 """The features that cannot be loaded, by their places."""
 _untold: list[str] = []
 """The warnings that were not reported yet."""
-_others: dict[str, tuple[Entry, Feature]] = {}
+_others: dict[str, tuple[FeatureEntry, Feature]] = {}
 """The features by others that are loaded, by their places."""
 
 
-class Attempt:
+class GuardedCall:
     """A call of what others wrote, which may raise anything: an exit, too, ends only the call. `failed` gets a text."""
 
     def __init__(self, failed: list[str]) -> None:
@@ -137,17 +137,17 @@ def _wheel(name: str) -> Feature | None:
     """A feature of the wheel; None where its folder was deleted, or where its module raises: that is a warning."""
     group = FAMILY_GROUP if name in FAMILIES else GROUP
     module, why = f"{group}.{name}", list[str]()
-    found: Feature | None = None
-    with Attempt(why):
+    feature: Feature | None = None
+    with GuardedCall(why):
         try:
             with importing():
-                found = getattr(importlib.import_module(module), RECORDS[group])
+                feature = getattr(importlib.import_module(module), RECORDS[group])
         except ModuleNotFoundError as missing:
             if missing.name not in (module, group):
                 raise
     if why:
-        _fail(Entry(name, WHEEL, "", module), why[0])
-    return found
+        _fail(FeatureEntry(name, WHEEL, "", module), why[0])
+    return feature
 
 
 wheel = cache(_wheel)
@@ -160,13 +160,13 @@ def with_word(word: str) -> Feature | None:
     """
     for name, words in (*FAMILIES.items(), *IN_WHEEL.items()):
         if word in words:
-            found = wheel(name)
-            if found is None:
+            feature = wheel(name)
+            if feature is None:
                 group, kind = (FAMILY_GROUP, "family") if name in FAMILIES else (GROUP, "feature")
                 failed = _failed.get(f"{group}.{name}")
                 what = f"the {kind} {name} {'is not there' if failed is None else f'cannot be loaded: {failed.why}'}"
                 raise Diagnostic(what, word.rstrip(":"), "install multidrop again, whole")
-            return found
+            return feature
     return None
 
 
@@ -184,60 +184,67 @@ def needed(kind: type[T], word: str) -> T:
 
 def words() -> tuple[str, ...]:
     """The words of the wheel's features, whether these are there or not."""
-    return tuple(word for each in (*FAMILIES.values(), *IN_WHEEL.values()) for word in each)
+    return tuple(word for family in (*FAMILIES.values(), *IN_WHEEL.values()) for word in family)
 
 
 # By others
 
 
-def entries() -> list[Entry]:
+def entries() -> list[FeatureEntry]:
     """The features by others: those of packages by their names, then a person's files, unless they are ignored."""
     from multidrop.base.places import configuration_ignored
 
     return [*_of_packages(), *(() if configuration_ignored() else _own())]
 
 
-def _of_packages() -> Iterator[Entry]:
+def _of_packages() -> Iterator[FeatureEntry]:
     from multidrop.base.places import state_folder
     from multidrop.base.store import Store
 
     store, environment = Store(state_folder()), _environment()
-    kept = store.find(KEPT, _parse_kept)
+    kept = store.find(FEATURES_FILE, _parse_kept)
     if kept is None or kept[0] != environment:
         kept = environment, sorted(_read_entry_points())
         with suppress(OSError):
-            store.write(KEPT, {"environment": environment, "entries": kept[1]}, synced=False)
+            store.write(FEATURES_FILE, {"environment": environment, "entries": kept[1]}, synced=False)
     yield from kept[1]
 
 
-def _parse_kept(found: Any) -> tuple[str, list[Entry]]:
-    return str(found["environment"]), [Entry(*map(str, row)) for row in found["entries"]]
+def _parse_kept(found: Any) -> tuple[str, list[FeatureEntry]]:
+    return str(found["environment"]), [FeatureEntry(*map(str, row)) for row in found["entries"]]
 
 
-def _read_entry_points() -> Iterator[Entry]:
+def _read_entry_points() -> Iterator[FeatureEntry]:
     from importlib.metadata import entry_points
 
     for group, record in RECORDS.items():
-        for each in entry_points(group=group):
-            source, version = (each.dist.name, each.dist.version) if each.dist is not None else ("?", "")
-            yield Entry(each.name, source, version, each.value if ":" in each.value else f"{each.value}:{record}")
+        for entry_point in entry_points(group=group):
+            source, version = (
+                (entry_point.dist.name, entry_point.dist.version) if entry_point.dist is not None else ("?", "")
+            )
+            yield FeatureEntry(
+                entry_point.name,
+                source,
+                version,
+                entry_point.value if ":" in entry_point.value else f"{entry_point.value}:{record}",
+            )
 
 
 def _environment() -> str:
     """What changes as a distribution comes or goes: the folders of modules, and when each was changed."""
-    found = [sys.version]
+    facts = [sys.version]
     for folder in sys.path[1:]:  # the first is that of the script
         with suppress(OSError):
-            found.append(f"{folder} {os.stat(folder).st_mtime_ns}")
-    return " ".join(found)
+            facts.append(f"{folder} {os.stat(folder).st_mtime_ns}")
+    return " ".join(facts)
 
 
-def _own() -> Iterator[Entry]:
+def _own() -> Iterator[FeatureEntry]:
     from multidrop.base.places import config_folder
 
     with suppress(OSError):
         for path in sorted((config_folder() / "features").glob("*.py")):
-            yield Entry(path.stem, str(path), "", str(path))
+            yield FeatureEntry(path.stem, str(path), "", str(path))
 
 
 def load_others() -> None:
@@ -245,7 +252,7 @@ def load_others() -> None:
     for entry in entries():
         if entry.place not in _others and entry.place not in _failed:
             why: list[str] = []
-            with Attempt(why):
+            with GuardedCall(why):
                 _others[entry.place] = entry, _loaded(entry)
             if why:
                 _fail(entry, why[0])
@@ -270,12 +277,12 @@ def refuse(name: str, why: str) -> None:
     _fail(entry, why)
 
 
-def _fail(entry: Entry, why: str) -> None:
-    _failed[entry.place] = failed = Failed(entry, " ".join(why.split()))
+def _fail(entry: FeatureEntry, why: str) -> None:
+    _failed[entry.place] = failed = FailedFeature(entry, " ".join(why.split()))
     _untold.append(str(failed))
 
 
-def _loaded(entry: Entry) -> Feature:
+def _loaded(entry: FeatureEntry) -> Feature:
     """Import a feature by others, and guard its functions. Raises anything."""
     from multidrop.base.foreign import guarded
 
@@ -283,23 +290,23 @@ def _loaded(entry: Entry) -> Feature:
         raise Diagnostic("another feature has this name")
     own = entry.place == entry.source
     with redirect_stdout(sys.stderr):  # what it prints is no reply of a drive
-        found = _of_file(entry.place) if own else _of_place(entry.place)
-    if not isinstance(found, Feature):
+        loaded = _of_file(entry.place) if own else _of_place(entry.place)
+    if not isinstance(loaded, Feature):
         record = RECORDS[GROUP] if own else entry.place.partition(":")[2]
         raise TypeError(f"{record} is no multidrop.base.feature.Feature")
-    if wrong := found.wrong():
+    if wrong := loaded.wrong():
         raise TypeError(wrong)
-    if found.name != entry.name or not NAME.fullmatch(found.name):
-        raise Diagnostic(f"its record has the name {found.name}; a name is a Python word in small letters")
-    for each in found.adds:
-        if isinstance(each, type):
-            raise TypeError(f"adds has the class {each.__name__}, not an instance of it")
-    taken = {*words(), *(claim for each in features() for claim in claims(each))}
-    for claim in claims(found):
+    if loaded.name != entry.name or not NAME.fullmatch(loaded.name):
+        raise Diagnostic(f"its record has the name {loaded.name}; a name is a Python word in small letters")
+    for added in loaded.adds:
+        if isinstance(added, type):
+            raise TypeError(f"adds has the class {added.__name__}, not an instance of it")
+    taken = {*words(), *(claim for feature in features() for claim in claims(feature))}
+    for claim in claims(loaded):
         if claim in taken:
             raise Diagnostic(f"{claim} is taken")
         taken.add(claim)
-    return guarded(found)
+    return guarded(loaded)
 
 
 def _of_place(place: str) -> Any:
@@ -356,7 +363,7 @@ def place(after: Mapping[str, str], names: list[str]) -> None:
     """Put each name behind the one that it comes after, which may be one of them; last, where that is not there."""
     left = dict(after)
     while left:
-        name = next((each for each, before in left.items() if before in names), next(iter(left)))
+        name = next((entry for entry, before in left.items() if before in names), next(iter(left)))
         before = left.pop(name)
         names.insert(names.index(before) + 1 if before in names else len(names), name)
 
@@ -364,7 +371,7 @@ def place(after: Mapping[str, str], names: list[str]) -> None:
 def records(those: Iterable[Feature], kind: type[T]) -> Iterator[T]:
     """What some features add of one class."""
     for feature in those:
-        yield from (each for each in feature.adds if isinstance(each, kind))
+        yield from (record for record in feature.adds if isinstance(record, kind))
 
 
 def added(kind: type[T]) -> Iterator[T]:
@@ -388,20 +395,20 @@ def claims(feature: Feature) -> Iterator[str]:
 
     A class of records has them in a method `claims`.
     """
-    for each in feature.adds:
-        if hasattr(each, "claims"):
-            yield from each.claims()
+    for record in feature.adds:
+        if hasattr(record, "claims"):
+            yield from record.claims()
 
 
-def states(version: str) -> Iterator[tuple[Entry, str, str]]:
+def states(version: str) -> Iterator[tuple[FeatureEntry, str, str]]:
     """Every feature with its meaning and its state, both in words. Loads those by others. `version`: the wheel's."""
     load_others()
     for group, names in ((FAMILY_GROUP, FAMILIES), (GROUP, IN_WHEEL)):
         for name in names:
-            yield Entry(name, WHEEL, version, ""), *_described(wheel(name), f"{group}.{name}")
+            yield FeatureEntry(name, WHEEL, version, ""), *_described(wheel(name), f"{group}.{name}")
     for entry in entries():
-        _, found = _others.get(entry.place, (entry, None))
-        yield entry, *_described(found, entry.place)
+        _, state = _others.get(entry.place, (entry, None))
+        yield entry, *_described(state, entry.place)
 
 
 def _described(feature: Feature | None, place: str) -> tuple[str, str]:

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from report import Row, alone, main
 
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 from multidrop.shell.log.index import IndexKeeper
 
 SIZE = 100 * 1000 * 1000
@@ -53,25 +53,25 @@ def written(path: Path, polls: bool, last: str, indexed: bool = True) -> datetim
     """Write a log of this size whose last drive's line is `last`; return its last time."""
     now, size, keeper = AT, 0, IndexKeeper(0)
     with path.open("wb") as file:
-        begin = [Entry(now, "log", "session of process 1", marks=True)]
-        begin += [Entry(now, "bus", "/dev/ttyUSB0: b LMDCM 6.002", "press")]
+        begin = [LogEntry(now, "log", "session of process 1", marks=True)]
+        begin += [LogEntry(now, "bus", "/dev/ttyUSB0: b LMDCM 6.002", "press")]
         while size < SIZE:
             now += timedelta(seconds=0.02)
             data = b"".join(map(line_of, [*begin, *_exchange(now, polls)]))
             size += file.write(data + (keeper.take(data) if indexed else b""))
             begin = []
-        file.write(line_of(Entry(now, "printed", last, "press", "b")))
+        file.write(line_of(LogEntry(now, "printed", last, "press", "b")))
     return now
 
 
-def _exchange(now: datetime, poll: bool) -> Iterator[Entry]:
+def _exchange(now: datetime, poll: bool) -> Iterator[LogEntry]:
     number = str(int(now.timestamp() * 50) % 100000)
     if not poll:
-        yield Entry(now, "typed", f"@b MA {number}", "press", "b", by="script")
-    yield Entry(now, "sent", "bPR P,DN,V\n", "press", "b", poll=poll)
-    yield Entry(now, "received", f'bPR P,DN,V\r\n{number}"b"6114\r\n>', "press", "b", poll=poll)
+        yield LogEntry(now, "typed", f"@b MA {number}", "press", "b", by="script")
+    yield LogEntry(now, "sent", "bPR P,DN,V\n", "press", "b", poll=poll)
+    yield LogEntry(now, "received", f'bPR P,DN,V\r\n{number}"b"6114\r\n>', "press", "b", poll=poll)
     if not poll:
-        yield Entry(now, "printed", number, "press", "b")
+        yield LogEntry(now, "printed", number, "press", "b")
 
 
 def _run(*arguments: str, code: int = 0) -> float:

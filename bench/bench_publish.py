@@ -32,9 +32,9 @@ from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
 from terminal import Terminal, multidrop
 
-from multidrop.features.publishing.broker import WINDOW, Connection, Message, parse_target
+from multidrop.features.publishing.broker import WINDOW, BrokerConnection, BrokerMessage, parse_target
 from multidrop.features.publishing.login import MqttSettings
-from multidrop.features.publishing.publisher import Backlog, Publisher
+from multidrop.features.publishing.publisher import Backlog, MessagePublisher
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") or ""
 NAMES = "abc"
@@ -98,18 +98,20 @@ def burst(rounds: int) -> Row:
 async def ours(port: int) -> float:
     """Messages a second through a publisher, until the last one is acknowledged."""
     target = parse_target(f"mqtt://127.0.0.1:{port}/bench")
-    connections: list[Connection] = []
+    connections: list[BrokerConnection] = []
 
-    def make() -> Connection:
-        connections.append(Connection(target, MqttSettings(), Message("bench/status", "lost", True), "bench"))
+    def make() -> BrokerConnection:
+        connections.append(
+            BrokerConnection(target, MqttSettings(), BrokerMessage("bench/status", "lost", True), "bench")
+        )
         return connections[-1]
 
-    online = Message("bench/status", "online", True)
-    publisher = Publisher(make, online, print, lambda _: None, Backlog(2 * BURST))
+    online = BrokerMessage("bench/status", "online", True)
+    publisher = MessagePublisher(make, online, print, lambda _: None, Backlog(2 * BURST))
     await publisher.begin()
     begin = time.perf_counter()
     for number in range(BURST):
-        publisher.put(Message("bench/a/position", TEXT.format(number), bus="a"))
+        publisher.put(BrokerMessage("bench/a/position", TEXT.format(number), bus="a"))
     while publisher.waiting or connections[0].in_flight():
         await asyncio.sleep(0.002)
     took = time.perf_counter() - begin

@@ -59,7 +59,7 @@ def rows(full: bool) -> Iterator[Row]:
 
 def _one_case() -> Row:
     """Processor time of a case in a process that is warm."""
-    made = plan.make(plan.Asked("go.mxt", "cell.toml", vary=[("load", "0..0.9:0.1")], expect=EXPECT))
+    made = plan.make(plan.SweepArguments("go.mxt", "cell.toml", vary=[("load", "0..0.9:0.1")], expect=EXPECT))
     ready, spent = trial.bench(made.job), []
     for number in range(1, 200):
         begin = time.process_time()

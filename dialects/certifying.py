@@ -74,11 +74,11 @@ class Certifying(OfDrive):
 
     def questions(self) -> list[Question]:
         """The questions for the drive, in order; of several with one name the first."""
-        own, found = self.traits(), dict[str, Question]()
-        for each in self.table():
-            if each.asks <= own:
-                found.setdefault(each.name, each)
-        return list(found.values())
+        own, questions = self.traits(), dict[str, Question]()
+        for question in self.table():
+            if question.asks <= own:
+                questions.setdefault(question.name, question)
+        return list(questions.values())
 
     @classmethod
     def table(cls) -> list[Question]:

@@ -44,8 +44,8 @@ def controls_of(module: str, axis: str = "", number: int = 1) -> Controls:
 
     Its lines are divided by ` // `; in them `{axis}` is the name of the axis, and `{number}` its number.
     """
-    found = {}
+    controls = {}
     for row in rows(module, "controls.csv"):
         lines = row["lines"].replace("{axis}", axis).replace("{number}", str(number)).split(" // ")
-        found[row["name"]] = Control(tuple(filter(None, lines)), row["about"], row.get("absent", ""))
-    return found
+        controls[row["name"]] = Control(tuple(filter(None, lines)), row["about"], row.get("absent", ""))
+    return controls

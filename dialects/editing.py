@@ -172,8 +172,8 @@ class EditingLanguage(ABC):
 
     def last_word(self, before: str) -> str:
         """Return the word at the end of a begun line that may be completed; the line is in no remark."""
-        found = self.last.search(before)
-        return found[0] if found else ""
+        match = self.last.search(before)
+        return match[0] if match else ""
 
     def fixed(self, name: UserName) -> str:
         """Return why a name cannot be another one; empty if it can."""
@@ -197,8 +197,8 @@ class EditingLanguage(ABC):
             return []
         word = self.last_word(before)
         folded = word.upper()
-        found = self.offered(before[: len(before) - len(word)], word, names, product)
-        return [each for each in found if each.text.upper().startswith(folded)]
+        offers = self.offered(before[: len(before) - len(word)], word, names, product)
+        return [offer for offer in offers if offer.text.upper().startswith(folded)]
 
     def renamed(self, text: str, name: UserName, new: str, product: str) -> str:
         """Return what to write at each place of a name to rename it.
@@ -218,8 +218,8 @@ class EditingLanguage(ABC):
 
 
 def replaced(lines: Sequence[str], places: Iterable[Span], new: str) -> list[str]:
-    found = list(lines)
+    changed = list(lines)
     for place in sorted(places, reverse=True):
-        line = found[place.line]
-        found[place.line] = line[: place.start] + new + line[place.stop :]
-    return found
+        line = changed[place.line]
+        changed[place.line] = line[: place.start] + new + line[place.stop :]
+    return changed

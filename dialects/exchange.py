@@ -91,9 +91,9 @@ def unsent_if_stopped(who: str, request: Request, steps: Procedure[T]) -> Proced
         raise Stopped(f"{who}: stopped; '{request.text}' was not sent") from None
 
 
-LONGEST = 6.0
+LONGEST_SYNC = 6.0
 """The longest time, s, for which a drive is looked for in what comes without a pause."""
-SHOWN = 40
+MOST_SHOWN_BYTES = 40
 """Most characters that are shown of that."""
 
 
@@ -119,7 +119,7 @@ def limited(who: str, text: str, fate: str, steps: Procedure[T], looking: Lookin
         asked = next(steps)
         while True:
             try:
-                if looking.spent > LONGEST:
+                if looking.spent > LONGEST_SYNC:
                     raise NoAnswer(f"{who} was looked for in {looking.spent:.0f} s of other bytes: '{text}' {fate}")
                 reply = yield asked
                 if reply.raw:  # with the wait for a quiet line before the request
@@ -137,7 +137,7 @@ def limited(who: str, text: str, fate: str, steps: Procedure[T], looking: Lookin
         result: T = end.value
         return result
     except NoAnswer as error:
-        if came := visible(looking.heard[:SHOWN].decode("latin-1").strip()):
+        if came := visible(looking.heard[:MOST_SHOWN_BYTES].decode("latin-1").strip()):
             raise NoAnswer(f"{error}; what came is no reply ('{came}'): check dialect, baud and the line") from None
         raise
 

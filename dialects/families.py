@@ -40,10 +40,12 @@ class Dialect(NamedTuple):
 
 def dialects() -> dict[str, Dialect]:
     """All languages by name, those of the wheel first."""
-    return {each.name: each for each in registry.records(registry.families(), Dialect)}
+    return {record.name: record for record in registry.records(registry.families(), Dialect)}
 
 
-FAMILIES: Mapping[str, type[Family]] = OnDemand(lambda: {each.name: each.record for each in dialects().values()})
+FAMILIES: Mapping[str, type[Family]] = OnDemand(
+    lambda: {dialect.name: dialect.record for dialect in dialects().values()}
+)
 """By name. Nothing tries one family after another: a URL names the family, or the drives are `DEFAULT`."""
 DEFAULT = registry.DEFAULT
 
@@ -58,7 +60,7 @@ def languages() -> list[Language]:
 
 
 def program_languages() -> dict[str, ProgramFiles]:
-    return {name: each.files for name, each in dialects().items() if each.files is not None}
+    return {name: dialect.files for name, dialect in dialects().items() if dialect.files is not None}
 
 
 def program_language_of(path: str | os.PathLike[str]) -> str:
@@ -66,8 +68,8 @@ def program_language_of(path: str | os.PathLike[str]) -> str:
     ending = os.path.splitext(path)[1].lower()
     if not any(ending in files.endings for files in program_languages().values()):
         registry.load_others()
-    found = (name for name, files in program_languages().items() if ending in files.endings)
-    return next(found, DEFAULT)
+    languages = (name for name, files in program_languages().items() if ending in files.endings)
+    return next(languages, DEFAULT)
 
 
 def correct_in(text: str, besides: str) -> str:
@@ -100,11 +102,13 @@ def _shares(text: str, language: FileLanguage) -> tuple[bool, bool]:
 def spoken(data: bytes, besides: str) -> str:
     """Name the family, another than `besides`, whose replies these bytes hold, for a message; empty: none."""
     names = (name for name, family in FAMILIES.items() if name != besides and family.in_frames(data))
-    found = next(names, "")
-    return f"frames came as {found.upper()} drives send them: dialect={found} opens such a line" if found else ""
+    language = next(names, "")
+    return (
+        f"frames came as {language.upper()} drives send them: dialect={language} opens such a line" if language else ""
+    )
 
 
-SHOWN = 40
+MOST_SHOWN_BYTES = 40
 """Most characters that are shown of what came from an unknown line."""
 
 
@@ -127,7 +131,7 @@ def seen(data: bytes, besides: str) -> str:
             else f"{len(data)} bytes came, {readable or 'none'} of them readable"
         )
         return f"{how}: another baud rate?"
-    text = visible(data[:SHOWN].decode("latin-1").strip())
+    text = visible(data[:MOST_SHOWN_BYTES].decode("latin-1").strip())
     repeated = "or an adapter that repeats what it sends (echo=local)"
     came = "1 byte came that is no reply" if one else f"{len(data)} bytes came that are no reply"
     return f"{came} ('{text}'): another language, {repeated}?"

@@ -361,9 +361,9 @@ class Family(OfDrive, ABC):
         self.check(text)
 
     def moving(self) -> Procedure[bool]:
-        """Whether the drive reports motion. At rest: none in two readings, `drives.drive.REST` apart."""
+        """Whether the drive reports motion. At rest: none in two readings, `drives.drive.LEAST_REST` apart."""
         axes = yield from self.motion(Priority.OPERATOR)
-        return any(each.velocity for each in axes)
+        return any(axis.velocity for axis in axes)
 
     def busy(self) -> Procedure[bool]:
         """Whether a program runs, which can move the drive. A stop is confirmed by it; if it raises: not known."""

@@ -96,13 +96,13 @@ NOTHING = Effect()
 def joined(effects: Sequence[Effect]) -> Effect:
     """What several lines do together."""
     return Effect(
-        tuple(move for each in effects for move in each.begins),
-        frozenset(axis for each in effects for axis in each.ends),
-        frozenset(axis for each in effects for axis in each.unknown),
-        any(each.halts for each in effects),
-        any(each.resumes for each in effects),
-        any(each.frees for each in effects),
-        any(each.clears for each in effects),
+        tuple(move for effect in effects for move in effect.begins),
+        frozenset(axis for effect in effects for axis in effect.ends),
+        frozenset(axis for effect in effects for axis in effect.unknown),
+        any(effect.halts for effect in effects),
+        any(effect.resumes for effect in effects),
+        any(effect.frees for effect in effects),
+        any(effect.clears for effect in effects),
     )
 
 

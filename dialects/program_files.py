@@ -46,7 +46,7 @@ def in_order(problems: Iterable[Problem]) -> list[Problem]:
 
 
 def errors(problems: Sequence[Problem]) -> list[Problem]:
-    return [each for each in problems if not each.warning]
+    return [problem for problem in problems if not problem.warning]
 
 
 def refuse(problems: Sequence[Problem], name: str) -> None:
@@ -61,9 +61,9 @@ def refuse(problems: Sequence[Problem], name: str) -> None:
 def check_enter(lines: Iterable[str], names: Container[str] = ()) -> Iterator[Problem]:
     """Report `^M` and `^J` that stand for Enter. `names` are those that a program combines with `^`."""
     for number, line in enumerate(lines, 1):
-        found = enter_in(line)
-        if found is not None and found[0][1] not in names:
-            yield Problem(number, found.start() + 1, f"{found[0]} {ENTER}")
+        match = enter_in(line)
+        if match is not None and match[0][1] not in names:
+            yield Problem(number, match.start() + 1, f"{match[0]} {ENTER}")
 
 
 def check_comment(line: str, number: int, mark: int) -> Iterator[Problem]:
@@ -73,8 +73,8 @@ def check_comment(line: str, number: int, mark: int) -> Iterator[Problem]:
     """
     if not behind_number(line, mark):
         return
-    if (found := grouped_at(line, mark)) is not None:
-        yield Problem(number, found.start + 1, found.why, "put a blank before a comment")
+    if (grouped := grouped_at(line, mark)) is not None:
+        yield Problem(number, grouped.start + 1, grouped.why, "put a blank before a comment")
     else:
         what = f"the comment begins right behind a number: {line[mark:].split()[0]} is not sent"
         yield Problem(number, mark + 1, what, "put a blank before it", warning=True)
@@ -131,7 +131,7 @@ def first_difference(found: Sequence[Difference], drive: str = "drive") -> str:
     return f"line {found[0].number} differs" if found[0].number else f"the {drive} holds more lines"
 
 
-class Part(NamedTuple):
+class LinePart(NamedTuple):
     """A part of a line, by columns from 0. `kind`: word, starts, label, text, remark or wrong.
 
     `starts`: a word that can start motion.
@@ -142,7 +142,7 @@ class Part(NamedTuple):
     kind: str
 
 
-class Entry(NamedTuple):
+class ProgramEntry(NamedTuple):
     """A place at which a program can begin: its name, its line in the file from 1, and the command that starts it."""
 
     name: str
@@ -193,10 +193,10 @@ class FileLanguage(Protocol):
     def measure(self, text: str) -> str:
         """Describe the length of a correct program. Raises Diagnostic for any other."""
 
-    def parts(self, line: str) -> Sequence[Part]:
+    def parts(self, line: str) -> Sequence[LinePart]:
         """Return the parts of a line that an editor shows in another style. Never fails."""
 
-    def entries(self, text: str) -> Sequence[Entry]:
+    def entries(self, text: str) -> Sequence[ProgramEntry]:
         """Return the places at which a program of a file can begin."""
 
 
@@ -223,8 +223,8 @@ class ProgramFiles(NamedTuple):
 
     def unsupported(self, text: str, product: str, version: str, part: str) -> list[Problem]:
         """Warn of what a program uses and one unit lacks, by the version and the part number that it reports."""
-        found: Callable[[str, str, str, str], list[Problem]] | None = imported_if(self.unsupported_at)
-        return found(text, product, version, part) if found is not None and (version or part) else []
+        check: Callable[[str, str, str, str], list[Problem]] | None = imported_if(self.unsupported_at)
+        return check(text, product, version, part) if check is not None and (version or part) else []
 
     @property
     def language(self) -> FileLanguage:
@@ -234,8 +234,8 @@ class ProgramFiles(NamedTuple):
     @property
     def editing(self) -> EditingLanguage:
         """Names, help and completion of a text under editing."""
-        found: EditingLanguage = imported(self.editing_at)
-        return found
+        language: EditingLanguage = imported(self.editing_at)
+        return language
 
 
 def numbered(lines: Sequence[str]) -> list[SourceLine]:
@@ -301,10 +301,10 @@ def walk(starts: Iterable[int], ways: Ways) -> dict[int, int | None]:
     queue = deque(before)
     while queue:
         place = queue.popleft()
-        for each in ways(place):
-            if each not in before:
-                before[each] = place
-                queue.append(each)
+        for way in ways(place):
+            if way not in before:
+                before[way] = place
+                queue.append(way)
     return before
 
 
@@ -323,8 +323,8 @@ def nearest(starts: Iterable[int], ways: Ways, wanted: Callable[[int], bool], mo
         place = queue.popleft()
         if wanted(place):
             return place
-        for each in ways(place):
-            if each not in seen:
-                seen[each] = None
-                queue.append(each)
+        for way in ways(place):
+            if way not in seen:
+                seen[way] = None
+                queue.append(way)
     return None

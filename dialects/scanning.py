@@ -41,7 +41,7 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SearchOutcome:
     """What a search shows beside the drives that it found."""
 
     remarks: tuple[str, ...] = ()
@@ -79,7 +79,7 @@ class Scan(ABC):
         """The number of steps of a search."""
 
     @abstractmethod
-    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[SearchOutcome]:
         """Search a line at its baud rate."""
 
     def clear(self) -> Procedure[None]:

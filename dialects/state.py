@@ -257,5 +257,5 @@ class OfDrive:
     @classmethod
     def offers(cls, name: str) -> bool:
         """Whether a family has something of its own in place of the default."""
-        having = [each for each in cls.__mro__ if name in vars(each)]
+        having = [kind for kind in cls.__mro__ if name in vars(kind)]
         return having[0] is not having[-1]

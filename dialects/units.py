@@ -47,7 +47,7 @@ DIGITS = 3
 """The least number of digits that a shown value has: typed back, it is not spoilt."""
 LOW, HIGH = -(2**31), 2**31 - 1
 """The numbers that every family takes; a word may take fewer, as its drive then says."""
-MOST = 16
+MOST_DECIMAL_PLACES = 16
 """The greatest number of decimal places."""
 QUANTITY = re.compile(rf"\{{(?P<number>{DECIMAL}) (?P<unit>[A-Za-z][A-Za-z0-9_/]*)\}}", re.ASCII)
 """A quantity in a line; any other braces are none."""
@@ -134,13 +134,13 @@ def quantity(text: str, own: Sequence[str] = ()) -> Quantity:
     """Read `12.5 mm`. Raises Diagnostic."""
     if _COMMA.search(text):
         raise Diagnostic(f"{text.strip()}: a number has no comma", "", "write 12.5, as in 12.5 mm")
-    found = _VALUE.fullmatch(text)
-    if found is None:
+    match = _VALUE.fullmatch(text)
+    if match is None:
         raise Diagnostic(f"{text.strip()!r} is no number with a unit", "", "valid: NUMBER SPACE UNIT, as in 12.5 mm")
-    return Quantity(Fraction(found[1]), unit_of(found[2], own))
+    return Quantity(Fraction(match[1]), unit_of(match[2], own))
 
 
-def decimal(value: Fraction, places: int = MOST) -> str:
+def decimal(value: Fraction, places: int = MOST_DECIMAL_PLACES) -> str:
     """The number with up to so many decimal places, without an exponent and without zeros at its end."""
     whole = round(abs(value) * 10**places)
     text = f"{whole:0{places + 1}}"
@@ -179,7 +179,7 @@ class Scale:
     @property
     def shown_travel(self) -> str:
         """The travel as it is typed, `0..300 mm`; empty without one."""
-        ends = [decimal(each / self.unit.factor) for each in self.travel or ()]
+        ends = [decimal(end / self.unit.factor) for end in self.travel or ()]
         return f"{'..'.join(ends)} {self.unit.name}" if ends else ""
 
     def with_zero(self, at: Fraction) -> Scale:
@@ -362,9 +362,9 @@ class Measure:
     def _floats(self) -> dict[Takes, tuple[float, float]]:
         units = self.scale.unit.factor
         return {
-            each: (float(self._signed(each) / units), float(self.scale.zero / units) if each is Takes.PLACE else 0.0)
-            for each in Takes
-            if self.counts(each)
+            takes: (float(self._signed(takes) / units), float(self.scale.zero / units) if takes is Takes.PLACE else 0.0)
+            for takes in Takes
+            if self.counts(takes)
         }
 
     def _signed(self, takes: Takes) -> Fraction:
@@ -380,7 +380,7 @@ class Measure:
         value = self.exact(number, takes) / self.scale.unit.factor
         one = abs(self._signed(takes)) / self.scale.unit.factor
         needed = max(_places(one) + 1, _places(abs(value)) + DIGITS - 1 if value else 0, 0)
-        return f"{decimal(value, min(needed, MOST))} {self.unit_for(takes)}"
+        return f"{decimal(value, min(needed, MOST_DECIMAL_PLACES))} {self.unit_for(takes)}"
 
     def unit_for(self, takes: Takes) -> str:
         return self.unit + ("", "/s", "/s2")[takes.per]
@@ -399,8 +399,8 @@ def strange_brace(text: str) -> str:
     What is in quotation marks is a text. No language of a drive has braces.
     """
     bare = QUANTITY.sub("", re.sub(r'"[^"]*(?:"|$)', '""', text))
-    found = re.search(r"\{[^{}]*\}?|\}", bare)
-    return found[0].strip() if found is not None else ""
+    match = re.search(r"\{[^{}]*\}?|\}", bare)
+    return match[0].strip() if match is not None else ""
 
 
 def unsendable(text: str) -> str:

@@ -60,11 +60,11 @@ class Readings:
 
     @property
     def values(self) -> dict[str, Value]:
-        return {each.name: each.value for each in self.readings}
+        return {reading.name: reading.value for reading in self.readings}
 
     @property
     def defaults(self) -> dict[str, Value]:
-        return {each.name: each.default for each in self.readings if each.default is not None}
+        return {reading.name: reading.default for reading in self.readings if reading.default is not None}
 
 
 @dataclass(frozen=True)
@@ -123,15 +123,15 @@ def read_each(
     names: Sequence[str], read: Callable[[str], Procedure[Reading]], progress: Progress, unread: Pairs = ()
 ) -> Procedure[Readings]:
     """Read settings one by one; a refused one is listed as unread. Raises NoAnswer."""
-    found, refused = [], [*unread]
+    readings, refused = [], [*unread]
     for done, name in enumerate(names):
         progress(done, len(names))
         try:
-            found.append((yield from read(name)))
+            readings.append((yield from read(name)))
         except Refused as refusal:
             refused.append((name, str(refusal)))
     progress(len(names), len(names))
-    return Readings(tuple(found), tuple(refused))
+    return Readings(tuple(readings), tuple(refused))
 
 
 class Parameters(OfDrive):
@@ -230,7 +230,7 @@ def differing(
     """The names whose values differ, each with both values; None where one side has none."""
     names = [*here, *(name for name in there if name not in here)]
     pairs = [(name, here.get(name), there.get(name)) for name in names]
-    return tuple(each for each in pairs if not same(each[1], each[2]))
+    return tuple(pair for pair in pairs if not same(pair[1], pair[2]))
 
 
 UNREAD = -1
@@ -329,9 +329,9 @@ class Part:
 
 def printed_number(who: str, word: str, text: str) -> float:
     """Convert a printed value. Raises Refused where it is not one number."""
-    if (found := real(text)) is None:
+    if (number := real(text)) is None:
         raise Refused(f"{who}: {word} is not a number: {text.strip() or 'nothing'}")
-    return found
+    return number
 
 
 @dataclass(frozen=True)

@@ -106,10 +106,10 @@ class Bus:
     async def search(self, procedure: Procedure[T]) -> T:
         """Run a search that lists no drive; a stop reaches every drive all the same."""
         family = self.roster.family
-        found = await self._conversations.run(procedure, family.new_state(family.codec, ""), searching=True)
+        results = await self._conversations.run(procedure, family.new_state(family.codec, ""), searching=True)
         if not self.link.departure.under_way:
             self.link.departure.cleared()
-        return found
+        return results
 
     async def add(self, found: Iterable[DriveState]) -> None:
         """List drives that such a search has found."""
@@ -128,7 +128,7 @@ class Bus:
         """
         self.telemetry.pause()
         try:
-            while ends := [each.over for each in self._conversations.under_way]:
+            while ends := [conversation.over for conversation in self._conversations.under_way]:
                 await asyncio.wait(ends)
         except asyncio.CancelledError:
             self.telemetry.resume()
@@ -175,7 +175,7 @@ class Bus:
             self._stopping.unasked()
             self.link.publish(Changed(self.now()))
             return
-        if ends := [each.over for each in self._conversations.under_way]:
+        if ends := [conversation.over for conversation in self._conversations.under_way]:
             await asyncio.wait(ends)
         self.roster.found_again(await self.roster.search_again(hints))
         self.silent = ""
@@ -223,7 +223,7 @@ class Bus:
 
     async def settled(self) -> None:
         """Wait until the last stop was seen to work, or not, and the conversations of now are over."""
-        if ends := {*self._stopping.tasks, *(each.over for each in self._conversations.under_way)}:
+        if ends := {*self._stopping.tasks, *(conversation.over for conversation in self._conversations.under_way)}:
             await asyncio.wait(ends)
 
     async def close(self) -> None:

@@ -18,7 +18,7 @@ from weakref import WeakKeyDictionary
 
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request
-from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
+from multidrop.drives.events import Concluded, ConversationOutcome, Transaction, Witnesses
 from multidrop.drives.link import Link, LostInFlight
 from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.drives.silence import explained
@@ -31,7 +31,7 @@ ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
 """Requests that only ask and move nothing."""
 
 
-OnOver = Callable[[Outcome[T]], None]
+OnOver = Callable[[ConversationOutcome[T]], None]
 """Called once with the outcome of a conversation, in the turn of the event loop in which it ends."""
 
 
@@ -52,7 +52,7 @@ class Conversations:
     @property
     def under_way(self) -> list[Conversation[Any]]:
         """All conversations that are not over, clean-ups included."""
-        return [each for turns in self._turns.values() for each in turns]
+        return [turn for turns in self._turns.values() for turn in turns]
 
     def engaged(self, state: DriveState) -> bool:
         return bool(self._turns.get(state))
@@ -166,7 +166,7 @@ class Conversation(Generic[T]):
         self._ticket = 0
         """The ticket of the request that is queued or in flight; 0: none is."""
         self._keeping: asyncio.Task[None] | None = None
-        self._outcome: Outcome[T] | None = None
+        self._outcome: ConversationOutcome[T] | None = None
         self._first: Transaction | None = None
         self._last: Transaction | None = None
         self._taken: list[Transaction] = []
@@ -326,7 +326,7 @@ class Conversation(Generic[T]):
             )
         elif (error is None or isinstance(error, Refused)) and self._last is not None and not self._searching:
             self._link.heard.replied(self._state.address)
-        self._outcome = Outcome(result, error, self._first, self._last)
+        self._outcome = ConversationOutcome(result, error, self._first, self._last)
         self._leave()
 
     def _leave(self) -> None:
@@ -372,7 +372,7 @@ async def awaited(start: Callable[[OnOver[T]], Conversation[T]]) -> T:
     """Start a conversation and wait for its outcome. Cancelling the caller stops it, with its clean-up."""
     future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
 
-    def settle(outcome: Outcome[T]) -> None:
+    def settle(outcome: ConversationOutcome[T]) -> None:
         if future.done():
             return
         if outcome.error is not None:

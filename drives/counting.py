@@ -81,8 +81,8 @@ class Counting:
         news = {}
         for axis in self.axes:
             before, recounts = self.changes(axis), state.recounts
-            found = yield from at_priority(units.basis(axis, None), priority)
-            self.saw(axis, found.settings, recounts)
+            basis = yield from at_priority(units.basis(axis, None), priority)
+            self.saw(axis, basis.settings, recounts)
             if (changes := self.changes(axis)) and changes != before:
                 news[axis] = changes
         return news

@@ -26,15 +26,15 @@ from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited, refuse_stranger
 from multidrop.drives.counting import Counting
-from multidrop.drives.events import Changed, Outcome, Transaction
+from multidrop.drives.events import Changed, ConversationOutcome, Transaction
 from multidrop.drives.line_checks import check_name, check_quantities
 from multidrop.drives.link import Link
 from multidrop.drives.motion_record import MotionRecord
 from multidrop.drives.port_journal import GLOBAL
-from multidrop.drives.protected_units import Values, protection, silent
-from multidrop.drives.readings import REST as REST
-from multidrop.drives.readings import Judged, Seen
-from multidrop.drives.readings import Running as Running
+from multidrop.drives.protected_units import TakenValues, protection, silent
+from multidrop.drives.readings import LEAST_REST as LEAST_REST
+from multidrop.drives.readings import Judged, MotionReading
+from multidrop.drives.readings import ProgramReading as ProgramReading
 
 T = TypeVar("T")
 NOT_SENT = (Refused, Inexpressible, Differs, MotionFailed)
@@ -72,8 +72,8 @@ class Drive:
         self.state = state
         self.transferring = False
         """A program is being transferred: the drive stays busy for a while."""
-        self.seen: Seen | None = None
-        self.running: Running | None = None
+        self.seen: MotionReading | None = None
+        self.running: ProgramReading | None = None
         self.resting: tuple[float, int, dict[str, int]] = (float("-inf"), 0, {})
         """When its positions were last requested, `commands` then, and the positions, if all axes were at rest."""
         self.calm = False
@@ -113,7 +113,7 @@ class Drive:
         self._conversations = conversations
         self._neighbours = neighbours
         self._judged = Judged()
-        self._values = Values()
+        self._values = TakenValues()
 
     @property
     def address(self) -> str:
@@ -200,7 +200,7 @@ class Drive:
             self.check_start(text)
         if not starts or self.one_by_one:
             return await self._send(text, check)
-        before = {each: each.commanded_at for each in self._meant}
+        before = {drive: drive.commanded_at for drive in self._meant}
         self.starts_now()
         noted = self.commanded_at
         self.starting += 1
@@ -211,8 +211,8 @@ class Drive:
                 self.commanded_at = before[self]
             raise
         except TransportLost:  # a stop that the loss kept from these drives is still for them
-            for each, at in before.items():
-                each.commanded_at = at if each.commanded_at == noted else each.commanded_at
+            for drive, at in before.items():
+                drive.commanded_at = at if drive.commanded_at == noted else drive.commanded_at
             raise
         finally:
             self.starting -= 1
@@ -226,7 +226,7 @@ class Drive:
 
     def check_address(self, text: str) -> None:
         """Raise Inexpressible for a line that begins with the address of a drive of this line, as on the wire."""
-        drives = [(each.address, each.state.name) for each in self._neighbours.all_drives]
+        drives = [(drive.address, drive.state.name) for drive in self._neighbours.all_drives]
         check_name(self.shown, text, self.family.addressed(text, self.state.product), drives)
         if self.state.address not in (*GLOBAL, *(address for address, _ in drives)):  # `@bMR 5`, without a blank
             whole = f"{self.state.address} {text}"
@@ -261,13 +261,13 @@ class Drive:
                 self._disturbed(text)
         self._values.took(known, text)
         asked = not stored and (self.state.unreferenced or self.starts(text))
-        found = self.family.referencing(text) if asked else None
-        if found is not None and found.homing:
-            self._homes(found.axis, before)
+        referencing = self.family.referencing(text) if asked else None
+        if referencing is not None and referencing.homing:
+            self._homes(referencing.axis, before)
             if self.state.unreferenced:
-                self._neighbours.homes(self, found.axis)
-        elif found is not None and found.axis not in self.anchored:
-            self.state.referenced(found.axis)
+                self._neighbours.homes(self, referencing.axis)
+        elif referencing is not None and referencing.axis not in self.anchored:
+            self.state.referenced(referencing.axis)
         return printed
 
     @property
@@ -323,9 +323,9 @@ class Drive:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""
         if self.link.away is None:
             at = self.link.stamp()
-            for each in self._meant:
-                each.started_at = each.commanded_at = at
-                each._judged.still.clear()
+            for drive in self._meant:
+                drive.started_at = drive.commanded_at = at
+                drive._judged.still.clear()
 
     @property
     def one_by_one(self) -> bool:
@@ -382,7 +382,7 @@ class Drive:
         """Begin to read position and velocity of each axis."""
         family = self.family
 
-        def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
+        def over(outcome: ConversationOutcome[tuple[Motion, ...]]) -> None:
             if outcome.error is None:
                 assert outcome.first is not None and outcome.last is not None
                 axes, at = outcome.result[0], outcome.first.sent_at
@@ -401,7 +401,7 @@ class Drive:
         return self.counting.holds(axis, self.state.recounts)
 
     async def rest(self) -> tuple[int, ...] | None:
-        """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
+        """Read whether it rests: None while it moves; else what a reading LEAST_REST later must show again, too."""
         at = self.link.now()
         if await self.run(self.family.moving()):
             return None
@@ -418,7 +418,7 @@ class Drive:
         return runs
 
     def _program_read(self, at: float, runs: bool) -> None:
-        self.running = Running(at, runs)
+        self.running = ProgramReading(at, runs)
         self.motions.runs(runs)
 
     async def run(self, procedure: Procedure[T], typed: bool = False) -> T:
@@ -436,10 +436,10 @@ class Drive:
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
             if transaction.sent:
-                for each in self._meant:
-                    each.counting.sent(transaction.request, each.family.units, each.state)
+                for drive in self._meant:
+                    drive.counting.sent(transaction.request, drive.family.units, drive.state)
 
-        def over(outcome: Outcome[T]) -> None:
+        def over(outcome: ConversationOutcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
             if isinstance(outcome.error, NoAnswer) and not replied:
                 self.missing = True
@@ -486,15 +486,15 @@ async def confirmed_motion(drive: Drive) -> tuple[Motion, ...]:
     """Read position and velocity of each axis; at velocity 0 once more, unless earlier readings confirm it."""
     axes = await drive.motion()
     if drive.seen is not None and not drive.seen.velocity and not drive.seen.at_rest():
-        await asyncio.sleep(REST)
+        await asyncio.sleep(LEAST_REST)
         axes = await drive.motion()
     return axes
 
 
 async def still(drive: Drive) -> bool:
-    """Read twice, REST apart, whether a drive is at rest."""
+    """Read twice, LEAST_REST apart, whether a drive is at rest."""
     place = await drive.rest()
     if place is None:
         return False
-    await asyncio.sleep(REST)
+    await asyncio.sleep(LEAST_REST)
     return place == await drive.rest()

@@ -84,7 +84,7 @@ MOST_HEARD = 16384
 """Most bytes that are kept of what comes before the first reply."""
 
 
-class Heard:
+class FirstBytes:
     """What came, and what was written, until a drive has replied for the first time."""
 
     def __init__(self) -> None:

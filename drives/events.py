@@ -160,8 +160,8 @@ class Subscribers(dict[type, tuple[Callable[[E], None], ...]]):
         """The subscriptions: a callback and the kinds that it takes, none for all."""
 
     def __missing__(self, kind: type) -> tuple[Callable[[E], None], ...]:
-        found = self[kind] = tuple(callback for callback, kinds in self._all if not kinds or kind in kinds)
-        return found
+        callbacks = self[kind] = tuple(callback for callback, kinds in self._all if not kinds or kind in kinds)
+        return callbacks
 
     def add(self, callback: Callable[[E], None], kinds: tuple[type, ...]) -> Callable[[], None]:
         added = (callback, kinds)
@@ -251,7 +251,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Outcome(Generic[T]):
+class ConversationOutcome(Generic[T]):
     """The end of a conversation: its result, or the error that it raised; its first and its last transaction."""
 
     result: tuple[T, ...] = ()
@@ -271,7 +271,7 @@ class Concluded:
 
     state: DriveState
     transactions: tuple[Transaction, ...]
-    outcome: Outcome[Any]
+    outcome: ConversationOutcome[Any]
     unproven: str
     """The command with which it failed, if it is not known whether that was executed."""
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 
 CR, LF = 0x0D, 0x0A
-LONGEST = 80
+LONGEST_KEPT_TEXT = 80
 """Bytes of an unfinished line that are kept."""
 REPLIED = 0.3
 """Seconds without a reply after which a reply is none to that end of a line."""
@@ -61,7 +61,7 @@ class HalfLine:
             if byte in (CR, LF):
                 self._end(byte, now)
             else:
-                self.text = (self.text + bytes([byte]))[-LONGEST:]
+                self.text = (self.text + bytes([byte]))[-LONGEST_KEPT_TEXT:]
             self._after_cr = byte == CR
         return ended
 
@@ -120,7 +120,7 @@ class Rest:
         return b"" if end is None else data[end.end() :]
 
 
-class Parts:
+class FrameDivider:
     """Divides a client's bytes into whole frames of one size; `size` 0: there are none, and all bytes pass."""
 
     def __init__(self, size: int) -> None:

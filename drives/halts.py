@@ -96,7 +96,7 @@ class Halt:
         known = () if axes is None else drive.family.units.axes()
         if axes is None or axes.issuperset(known) or known == [""]:
             return ""
-        return "".join(f" {'motor ' * each.isdigit()}{each.upper()}" for each in known if each in axes)
+        return "".join(f" {'motor ' * axis.isdigit()}{axis.upper()}" for axis in known if axis in axes)
 
     def fate(self, drive: Drive) -> Fate:
         """What is known of one of its drives now."""

@@ -30,7 +30,7 @@ from multidrop.drives.echoes import LONGEST_TAIL, TERMINATORS, EchoWatch, LocalE
 # session that was killed leaves replies to its questions, and echoes. A line that may be program output is shown.
 
 
-LATE = 10.0
+LATE_WITHIN = 10.0
 """How long a missing reply may still come and be taken for another, s."""
 MOST_EVIDENCE = 8
 """Most lines kept after a doubtful reply: one is enough as evidence against it."""
@@ -111,7 +111,7 @@ class Doubt:
             return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))
         if _outstanding(request, reply, doubtful):
             cut = reply.end in (End.DAMAGED, End.STOPPED) and heard != b"" and not heard.endswith(TERMINATORS)
-            late = _Late(now + LATE, request, nak=reply.end is End.NAK, begun=cut)
+            late = _Late(now + LATE_WITHIN, request, nak=reply.end is End.NAK, begun=cut)
             own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]  # none before the first
             self._late = [*others, *own, late]
         return Weight(doubtful)
@@ -225,7 +225,7 @@ class Leftovers:
 
     def request_written(self, data: bytes, now: float) -> None:
         text = data.decode("latin-1").strip("\r\n")
-        self._sent += [each for each in (text, text.rstrip(CHECK_BYTES)) if len(each) > 1]
+        self._sent += [form for form in (text, text.rstrip(CHECK_BYTES)) if len(form) > 1]
         self._sent_at = now
 
     def divided(
@@ -235,23 +235,23 @@ class Leftovers:
 
         `answers_host`: whether only a question of a host makes a drive send a line.
         """
-        if now <= self._sent_at + LATE:
-            lines = tuple(each for each in self._without_parts(lines) if not self._is_echo(each))
+        if now <= self._sent_at + LATE_WITHIN:
+            lines = tuple(part for part in self._without_parts(lines) if not self._is_echo(part))
         if self.recovering:
             return (), lines
-        if now > self._opened_at + LATE:
+        if now > self._opened_at + LATE_WITHIN:
             return lines, ()
         left = tuple(filter(answers_host, lines))
-        return tuple(each for each in lines if each not in left), left
+        return tuple(line for line in lines if line not in left), left
 
     def _without_parts(self, lines: tuple[str, ...]) -> tuple[str, ...]:
         """Leave out lines that are one request together: a search ends each of its first letters with a line feed."""
-        sent = {_without_blanks(each) for each in self._sent}
+        sent = {_without_blanks(text) for text in self._sent}
         kept, begin = list[str](), 0
         while begin < len(lines):
             whole = (
                 end
-                for end in range(min(begin + PARTS, len(lines)), begin + 1, -1)
+                for end in range(min(begin + MOST_PARTS, len(lines)), begin + 1, -1)
                 if _without_blanks("".join(lines[begin:end])) in sent
             )
             if (end := next(whole, None)) is None:
@@ -262,12 +262,12 @@ class Leftovers:
     def _is_echo(self, line: str) -> bool:
         """Whether a line repeats requests, one or several, after a prompt at most."""
         rest = line
-        while own := max((each for each in self._sent if rest.endswith(each)), key=len, default=""):
+        while own := max((text for text in self._sent if rest.endswith(text)), key=len, default=""):
             rest = rest.removesuffix(own).rstrip("\r\n")
         return rest != line and not rest.strip(PROMPT)
 
 
-PARTS = 3
+MOST_PARTS = 3
 """Lines that one request is sent as, at most: a search ends its first two letters with a line feed each."""
 
 
@@ -384,13 +384,13 @@ class Inbox:
         if self._cut_off is None or not self.buffer:
             return False
         request, received = self._cut_off
-        found = request.codec.decode(request, self.buffer)
-        if found is None and self.awaits_tail(now) and len(self.buffer) <= LONGEST_TAIL:
+        decoded = request.codec.decode(request, self.buffer)
+        if decoded is None and self.awaits_tail(now) and len(self.buffer) <= LONGEST_TAIL:
             return True
         self._cut_off = None
-        if found is not None:
-            self._publish(now, found.strays)
-        self.buffer = self.buffer[found.used if found is not None else received :]
+        if decoded is not None:
+            self._publish(now, decoded.strays)
+        self.buffer = self.buffer[decoded.used if decoded is not None else received :]
         return False
 
     # Unsolicited lines

@@ -94,7 +94,7 @@ class Flight:
         return self.due
 
 
-class Waiting(NamedTuple):
+class QueuedRequest(NamedTuple):
     """A queued request and its ticket, by which its end is reported. The least is next; no two tickets are equal."""
 
     priority: Priority
@@ -102,7 +102,7 @@ class Waiting(NamedTuple):
     request: Request
 
 
-QUIET = 0.1
+RECOVERY_QUIET = 0.1
 """Quiet time after which a recovering line is written to again, s."""
 HELD_UP = 4
 """Quiet times for which further stops hold up a piece of the first one."""
@@ -153,7 +153,7 @@ class Line:
         """Number of times that bytes came which no request asked for."""
         self.printed_at = float("-inf")
         """Time of the last bytes that no request asked for."""
-        self._queue: list[Waiting] = []
+        self._queue: list[QueuedRequest] = []
         """What waits for the wire: by priority, then in order."""
         self._tickets = 0
         self._poll_passed_over = False
@@ -181,7 +181,7 @@ class Line:
     def ask(self, request: Request) -> int:
         """Queue a request; return the ticket under which its end is reported."""
         self._tickets += 1
-        insort(self._queue, Waiting(request.priority, self._tickets, request))
+        insort(self._queue, QueuedRequest(request.priority, self._tickets, request))
         return self._tickets
 
     def withdraw(self, ticket: int) -> bool:
@@ -192,7 +192,7 @@ class Line:
 
     @property
     def waiting(self) -> Sequence[Request]:
-        return [each.request for each in self._queue]
+        return [queued.request for queued in self._queue]
 
     # Bytes
 
@@ -267,13 +267,13 @@ class Line:
             self._finish(flight, Decoded(Reply(end=End.STOPPED), 0), now)
         dropped, self._queue = self._queue, []
         if only is not None:
-            self._queue = [each for each in dropped if each.request.address not in only]
-            dropped = [each for each in dropped if each.request.address in only]
-        for each in dropped:
-            ended = Transaction(each.request, Reply(end=End.STOPPED), now, now, now, sent=False)
-            self._events.append(Finished(each.ticket, ended))
+            self._queue = [queued for queued in dropped if queued.request.address not in only]
+            dropped = [queued for queued in dropped if queued.request.address in only]
+        for queued in dropped:
+            ended = Transaction(queued.request, Reply(end=End.STOPPED), now, now, now, sent=False)
+            self._events.append(Finished(queued.ticket, ended))
         self.inbox.stop(flight.request if flight is not None else None)
-        added = [each for each in repeats if each.data]
+        added = [repeat for repeat in repeats if repeat.data]
         if since is not None:
             return self.went_on(added, since)
         waited, _ = divided(self._repeats)
@@ -314,7 +314,7 @@ class Line:
 
     def take_repeats(self) -> bytes:
         """Remove and return the stop that is still to be repeated, for a caller that cannot wait for quiet."""
-        repeats, self._repeats = b"".join(each.data for each in self._repeats), []
+        repeats, self._repeats = b"".join(repeat.data for repeat in self._repeats), []
         return repeats
 
     # Transitions
@@ -331,10 +331,10 @@ class Line:
         if isinstance(self._state, Flight):
             flight = self._state
             echo = self.inbox.echo
-            found = self._without_echo(flight, echo, now) if echo and echo.own else self._decoded(flight, now)
-            if found is not None:
-                self._finish(flight, found, now)
-            return found is not None
+            decoded = self._without_echo(flight, echo, now) if echo and echo.own else self._decoded(flight, now)
+            if decoded is not None:
+                self._finish(flight, decoded, now)
+            return decoded is not None
         self.inbox.sort(now)
         if not (self._queue or self._repeats):
             return False
@@ -359,9 +359,9 @@ class Line:
         """Write the next request. A poll passed over once goes first, or typing would blind a plot."""
         poll_waits, at = self._queue[-1].priority is Priority.POLL, 0
         if poll_waits and self._poll_passed_over:
-            at = next(at for at, each in enumerate(self._queue) if each.priority is Priority.POLL)
+            at = next(at for at, queued in enumerate(self._queue) if queued.priority is Priority.POLL)
         if self._nak_of:
-            at = next((at for at, each in enumerate(self._queue) if each.request.address == self._nak_of), at)
+            at = next((at for at, queued in enumerate(self._queue) if queued.request.address == self._nak_of), at)
         priority, ticket, request = self._queue.pop(at)
         self._poll_passed_over = poll_waits and priority is not Priority.POLL
         request = copy_with(request, tag=ticket)
@@ -400,16 +400,16 @@ class Line:
         buffer = self.inbox.buffer
         if not self._takes_reply(flight):
             return codec.on_timeout(request, b"") if now >= flight.times(buffer, self.timeout)[1] else None
-        found = codec.decode(request, buffer) if buffer else None
-        if found is not None:
-            return found
+        decoded = codec.decode(request, buffer) if buffer else None
+        if decoded is not None:
+            return decoded
         quiet, timeout = flight.times(buffer, self.timeout)
         if flight.judged_length != len(buffer) and now >= quiet:
             flight.judged_length = len(buffer)
-            found = codec.on_quiet(request, buffer)
-        if found is None and now >= timeout:
+            decoded = codec.on_quiet(request, buffer)
+        if decoded is None and now >= timeout:
             return codec.on_timeout(request, buffer)
-        return found
+        return decoded
 
     def _takes_reply(self, flight: Flight) -> bool:
         """Whether what comes is the reply to it: not if a stop of another thread kept it back, or has left since."""
@@ -453,7 +453,7 @@ class Line:
     def _quiet_at(self, trouble: Recovering) -> float:
         """Time at which the wire has been quiet long enough, or is given up on."""
         since = max(self.transmitted, trouble.since)
-        quiet = self._repeats[0].quiet if self._repeats else QUIET
+        quiet = self._repeats[0].quiet if self._repeats else RECOVERY_QUIET
         quiet_at = min(max(self.inbox.received_at, since) + quiet, since + NEVER_QUIET)
         if not self._repeats:
             return max(quiet_at, self.inbox.tail_at() or quiet_at)  # not in the middle of a program's line
@@ -461,7 +461,7 @@ class Line:
         return min(quiet_at, max(self.transmitted, trouble.held_up_since + HELD_UP * quiet))
 
 
-PAUSE = 0.5
+LONG_QUIET = 0.5
 """A piece of a stop with a longer quiet time begins its repetition: every drive has been sent a stop before it, s."""
 
 
@@ -475,15 +475,15 @@ def merged(pending: Sequence[StopPiece], added: Sequence[StopPiece], keep: bool 
         return [*added]
     before, again = divided(pending)
     soon, late = divided(added)
-    first = [each for each in before if _taken_from(soon, each) or keep]
-    rest = [each for each in again if each not in late] if keep else []
+    first = [piece for piece in before if _taken_from(soon, piece) or keep]
+    rest = [piece for piece in again if piece not in late] if keep else []
     return [*first, *soon, *rest, *late]
 
 
 def divided(pieces: Sequence[StopPiece]) -> tuple[list[StopPiece], list[StopPiece]]:
     """Pieces before and behind the pause of a stop."""
-    for at, each in enumerate(pieces):
-        if each.quiet > PAUSE:
+    for at, piece in enumerate(pieces):
+        if piece.quiet > LONG_QUIET:
             return [*pieces[:at]], [*pieces[at:]]
     return [*pieces], []
 

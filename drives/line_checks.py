@@ -27,6 +27,6 @@ def check_name(shown: str, text: str, found: tuple[str, str] | None, drives: Seq
     name, line = found
     addresses = {address: f"@{name} {line}" for address, _ in drives if address}
     plain = {named: line for address, named in drives if not address}
-    everyone = {each: f"@{each} {line}" for each in GLOBAL if addresses}
+    everyone = {address: f"@{address} {line}" for address in GLOBAL if addresses}
     if (right := (everyone | plain | addresses).get(name)) is not None:
         raise Inexpressible(f"{shown}: '{text}' is not a command: write {right}; nothing was sent")

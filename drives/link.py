@@ -15,7 +15,7 @@ from multidrop.base.errors import TransportLost
 from multidrop.base.isolation import isolated
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives import events
-from multidrop.drives.echoes import TERMINATORS, Heard
+from multidrop.drives.echoes import TERMINATORS, FirstBytes
 from multidrop.drives.inbox import Debris, Leftovers
 from multidrop.drives.line import EchoFound, Finished, Line, Write, divided
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
@@ -79,7 +79,7 @@ class Link:
         self.departure = Departure(keeper)
         """The note on the command that is on its way."""
         self._keeper = keeper
-        self.debris, self.heard = Debris(), Heard()
+        self.debris, self.heard = Debris(), FirstBytes()
         self.leftovers = Leftovers()
         self._counted = 0
         self._came_unasked, self._unasked_said, self._opened_at = 0, -inf, -inf
@@ -314,11 +314,11 @@ class Link:
         self.on_unsolicited(event.lines)
         if lines := self.debris.removed(event.lines, self.line.inbox.codec.stop_debris, now):
             codec = self.line.inbox.codec
-            if damaged := [each for each in lines if codec.damaged(each)]:
+            if damaged := [line for line in lines if codec.damaged(line)]:
                 self.notify(f"a printed line was damaged on the line (received {_short(damaged)})", warning=True)
-                lines = tuple(each for each in lines if each not in damaged)
-        if unasked := [each for each in lines if not self.line.inbox.codec.printed(each)]:
-            lines = tuple(each for each in lines if each not in unasked)
+                lines = tuple(line for line in lines if line not in damaged)
+        if unasked := [line for line in lines if not self.line.inbox.codec.printed(line)]:
+            lines = tuple(line for line in lines if line not in unasked)
             self._unasked(unasked, now, "without a question", UNLIKE_A_DRIVE)
         lines, left = self.leftovers.divided(lines, self.line.inbox.codec.answers_host, now)
         if left:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from multidrop.dialects.motions import Effect, Ending, Evidence, Move, MoveKind, Outcome, Signs
 
-KEPT = 8
+MOST_KEPT_COURSES = 8
 """The most motions of one axis that are kept, each of another sequence."""
 NOT_OURS = "not by this script"
 MAYBE_RESTARTED = "it gave no reply on the way and is at 0, so it may have been restarted"
@@ -101,14 +101,14 @@ class MotionRecord:
     def begin(self, courses: Iterable[Course]) -> None:
         """Record motions whose line is on its way. A motion of the same sequence on the same axis is replaced well."""
         for new in courses:
-            kept = [each for each in self._courses.get(new.move.axis, ()) if each.by is not new.by]
-            for each in kept:
-                if each.open and each.replaced is None:
-                    each.replaced = new.move
-            self._courses[new.move.axis] = [*kept, new][-KEPT:]
+            kept = [course for course in self._courses.get(new.move.axis, ()) if course.by is not new.by]
+            for course in kept:
+                if course.open and course.replaced is None:
+                    course.replaced = new.move
+            self._courses[new.move.axis] = [*kept, new][-MOST_KEPT_COURSES:]
             if new.move.kind is MoveKind.PROGRAM:
-                for each in self._all():
-                    each.program = True
+                for course in self._all():
+                    course.program = True
 
     def copy(self) -> Courses:
         """Return what `restore` needs if the drive refuses a line."""
@@ -125,9 +125,9 @@ class MotionRecord:
             now = [each for each in self._courses[axis] if each is not course]
             known = [each.by for each in now]
             self._courses[axis] = [*(each for each in before.get(axis, ()) if each.by not in known), *now]
-            for each in self._courses[axis]:
-                if each.replaced is course.move:
-                    each.replaced = None
+            for known_course in self._courses[axis]:
+                if known_course.replaced is course.move:
+                    known_course.replaced = None
 
     def effect(self, effect: Effect, by: Sequence) -> None:
         """Record what else a line does, which was not refused."""
@@ -144,7 +144,7 @@ class MotionRecord:
 
     def stopped(self, by: Sequence | None, axes: frozenset[str] | None = None) -> None:
         """Record a stop of axes (None: all). `by` None: of the whole session, which no sequence outlives unasked."""
-        together = frozenset(axis for each in self._open(axes or NO_AXES) for axis in each.move.group)
+        together = frozenset(axis for course in self._open(axes or NO_AXES) for axis in course.move.group)
         self._note_stop(by, self._all() if axes is None else self._open(axes | together))
 
     def _note_stop(self, by: Sequence | None, courses: Iterable[Course]) -> None:
@@ -177,18 +177,18 @@ class MotionRecord:
 
     def of(self, by: Sequence) -> list[Course]:
         """The last motion of a sequence on each axis."""
-        return [each for each in self._all() if each.by is by]
+        return [course for course in self._all() if course.by is by]
 
     def open_of(self, by: Sequence) -> list[Course]:
         """Those whose end was not judged yet."""
-        return [each for each in self.of(by) if each.open]
+        return [course for course in self.of(by) if course.open]
 
     @property
     def any_open(self) -> bool:
-        return any(each.open for each in self._all())
+        return any(course.open for course in self._all())
 
     def _all(self) -> list[Course]:
-        return [each for courses in self._courses.values() for each in courses]
+        return [course for courses in self._courses.values() for course in courses]
 
     def _open(self, axes: frozenset[str]) -> list[Course]:
-        return [each for axis in axes for each in self._courses.get(axis, ()) if each.open]
+        return [course for axis in axes for course in self._courses.get(axis, ()) if course.open]

@@ -18,7 +18,7 @@ from multidrop.base.isolation import isolated
 from multidrop.dialects import End
 from multidrop.drives.conversations import Conversation, OnOver
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Outcome
+from multidrop.drives.events import ConversationOutcome
 from multidrop.drives.roster import Roster
 
 MOST_SILENCES = 5
@@ -106,9 +106,9 @@ class Poller(ABC, Generic[Thing]):
 
     def _count(self) -> None:
         self.periods = {}
-        for each in self._open:
-            for thing in each.things:
-                self.periods[thing] = min(each.period, self.periods.get(thing, each.period))
+        for subscription in self._open:
+            for thing in subscription.things:
+                self.periods[thing] = min(subscription.period, self.periods.get(thing, subscription.period))
         now = self._link.now()
         for thing, period in self.periods.items():
             due = self._due.setdefault(thing, Due())
@@ -178,7 +178,7 @@ class Poller(ABC, Generic[Thing]):
     ) -> None:
         """Read a thing in one conversation; `took` is called with the time of its last request and what was read."""
 
-        def over(outcome: Outcome[Read]) -> None:
+        def over(outcome: ConversationOutcome[Read]) -> None:
             self._busy, self._under_way, last = False, None, outcome.last
             if outcome.error is None:
                 due.silences = due.refusals = 0
@@ -191,7 +191,7 @@ class Poller(ABC, Generic[Thing]):
         under_way = start(over)
         self._under_way = under_way if self._busy else None
 
-    def _failed(self, thing: Thing, due: Due, outcome: Outcome[Any]) -> None:
+    def _failed(self, thing: Thing, due: Due, outcome: ConversationOutcome[Any]) -> None:
         """Set when a thing is read again that was not read."""
         with self._isolated(thing, due, f"polling {thing} on {self._link.name}", FAILED):
             try:

@@ -28,7 +28,7 @@ def silent(error: E, link: Link, family: type[Family] | Family, product: str = "
     return type(error)(f"{error}; {known.besides}{text}") if known is not None and text else error
 
 
-class Values:
+class TakenValues:
     """The values that a drive has taken or refused in this session."""
 
     def __init__(self) -> None:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from multidrop.dialects import Motion
 
-REST = 0.05
+LEAST_REST = 0.05
 """The least time between two readings that show a drive at rest, s."""
 RECENT = 1.0
 """The longest time between two readings that are compared where nothing else is known of the time between, s."""
 
 
 @dataclass(frozen=True)
-class Seen:
+class MotionReading:
     """The last reading of a drive's motion."""
 
     at: float
@@ -26,10 +26,12 @@ class Seen:
     transmitted_at: float = float("-inf")
     """When its last request had left."""
     confirms: float = float("-inf")
-    """When the latest reading was requested that shows the same rest, and at least REST earlier; -inf: none does."""
+    """When the latest reading was requested that shows the same rest, and at least LEAST_REST earlier; -inf: none
+    does.
+    """
 
     def at_rest(self, since: float | None = None) -> bool:
-        """Whether two readings after `since`, REST apart, show it at rest; by default two recent ones."""
+        """Whether two readings after `since`, LEAST_REST apart, show it at rest; by default two recent ones."""
         return self.confirms > (self.at - RECENT if since is None else since)
 
 
@@ -41,7 +43,7 @@ class Judged:
         """When the last readings in a row were requested that show it at rest in one place."""
         self._last = (float("-inf"), tuple[int, ...]())
 
-    def reading(self, at: float, transmitted_at: float, axes: Sequence[Motion], in_place: bool) -> Seen:
+    def reading(self, at: float, transmitted_at: float, axes: Sequence[Motion], in_place: bool) -> MotionReading:
         """Judge a reading. `in_place`: at rest the position must stay, too."""
         (before, places), here = self._last, tuple(axis.position for axis in axes)
         self._last = at, here
@@ -54,14 +56,14 @@ class Judged:
         velocity = max(velocities, key=abs)
         if velocity or displaced:
             self.still.clear()
-        earlier = [each for each in self.still if each <= at - REST]
+        earlier = [rest for rest in self.still if rest <= at - LEAST_REST]
         if not velocity:
             self.still = [*earlier[-1:], *self.still[len(earlier) :], at]
-        return Seen(at, velocity, tuple(velocities), transmitted_at, earlier[-1] if earlier else float("-inf"))
+        return MotionReading(at, velocity, tuple(velocities), transmitted_at, earlier[-1] if earlier else float("-inf"))
 
 
 @dataclass(frozen=True)
-class Running:
+class ProgramReading:
     """The last reading of a drive's programs."""
 
     at: float

@@ -35,7 +35,7 @@ SLOW = 1.0
 OPENING, OPENING_PLACE, REPAIRS, SLOW_BAUD = 8.0, 4.0, 60.0, 4800
 """The time limit of a search, s: for itself, for each address, for what is owed to drives; at this baud rate and above
 with a timeout of 1 s."""
-PAUSE = 0.25
+RETRY_PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
 BOOT = 1.0
 """Seconds after a sign-on before the drive is asked."""
@@ -43,7 +43,7 @@ TOGETHER = 3.0
 """Seconds after a restart in which those of other drives of the line are found, if the same cause restarted them."""
 SAME_CAUSE = 60.0
 """Seconds within which a drive that was silent may have been restarted by what has restarted another one."""
-NAMED = 4
+MOST_SIGNS = 4
 """Most settings that a message names."""
 
 
@@ -98,7 +98,7 @@ class Restarts:
         """
         await asyncio.sleep(BOOT if sign else 0)
         while self._link.away is not None or drive.programming or drive.transferring:
-            await asyncio.sleep(PAUSE)
+            await asyncio.sleep(RETRY_PAUSE)
         try:
             axes = await drive.motion()
             settings: dict[str, Value] = {}
@@ -124,13 +124,13 @@ class Restarts:
             signs.append(f"{name}position {was}{axis.position} now")
         for name in changed:
             signs.append(f"{_shown(name)} {_text(before[name])} before, {_text(settings[name])} now")
-        more = f"; {len(signs) - NAMED} more differ" if len(signs) > NAMED else ""
+        more = f"; {len(signs) - MOST_SIGNS} more differ" if len(signs) > MOST_SIGNS else ""
         drive.state.reference_lost(axis.axis for axis in axes)
         self.restarted(drive)
         drive.hold = f"it was restarted ({signs[0]})" if drive.strict else ""
         verb = f"/referenced {drive.address}".rstrip()
         self._link.notify(
-            f"{drive.shown} was restarted ({'; '.join(signs[:NAMED])}{more}): its position is not referenced; "
+            f"{drive.shown} was restarted ({'; '.join(signs[:MOST_SIGNS])}{more}): its position is not referenced; "
             f"home it, set its position, or {verb} if it is right",
             drive.address,
             warning=True,
@@ -148,7 +148,7 @@ class Restarts:
         drive.state.counts_may_have_changed(restarted=True)
         self._link.publish(Restarted(now, drive.address, certain))
         if certain and (self._together is None or self._together.done()):
-            before = {each: each.rested for each in self._all_drives()}
+            before = {other: other.rested for other in self._all_drives()}
             work = partial(self._look_at_others, before, now)
             self._together = self._begin("looking for restarts of other drives", work)
 
@@ -195,7 +195,7 @@ class Restarts:
         """Wait until the drive rests; the axis is referenced if nothing was sent in between and no error is set."""
         try:
             while not await still(drive):
-                await asyncio.sleep(PAUSE)
+                await asyncio.sleep(RETRY_PAUSE)
             ended_well = await drive.homing_ended(axis)
         except (DriveError, TransportLost):
             return
@@ -362,7 +362,7 @@ class Roster:
     async def search(self, hints: Hints) -> list[DriveState]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
         self.family = family = FAMILIES[hints.family or self.family.name]
-        self.probing = hints.drives or (*hints.tried, *(each.address for each in hints.remembered))
+        self.probing = hints.drives or (*hints.tried, *(remembered.address for remembered in hints.remembered))
         unknown = family.new_state(family.codec, "")
         try:
             async with asyncio.timeout(limit := self._limit(hints)):

@@ -22,16 +22,16 @@ from functools import partial
 from multidrop.base.isolation import isolated
 from multidrop.dialects import StopPiece
 from multidrop.drives import pacing
-from multidrop.drives.line import PAUSE, merged
+from multidrop.drives.line import LONG_QUIET, merged
 from multidrop.drives.link import Link
 from multidrop.drives.stop_forms import StopForms
 
-AGAIN = 0.02
+RETRY_AFTER = 0.02
 """Seconds after which a port that takes nothing is tried again."""
 
 
 @dataclass
-class Begun:
+class BegunStop:
     """A stop that was begun, and how far it is. Times are seconds of the link's clock."""
 
     forms: StopForms
@@ -54,7 +54,7 @@ class Begun:
 
     def due(self, byte_time: float) -> float:
         """When the next piece may be written."""
-        return max(self.clear(byte_time), *(self.left + each.quiet for each in self.pieces[:1]), 0.0)
+        return max(self.clear(byte_time), *(self.left + piece.quiet for piece in self.pieces[:1]), 0.0)
 
     def clear(self, byte_time: float) -> float:
         """When the last write has left and the reply to it has come, of about the same length."""
@@ -66,7 +66,7 @@ class Begun:
 
     def goes_on(self) -> bool:
         """Whether some drives have not had their turn yet."""
-        return bool(self.pieces) and self.pieces[0].quiet <= PAUSE
+        return bool(self.pieces) and self.pieces[0].quiet <= LONG_QUIET
 
     def wrote(self, data: bytes, now: float, byte_time: float) -> bytes:
         self.left = now + len(data) * byte_time
@@ -80,7 +80,7 @@ class StopAhead:
     def __init__(self, link: Link, forms: Callable[[], StopForms], went_on: Callable[[], None]) -> None:
         """`forms` makes a stop. `went_on` is called in the loop once a thread has gone on with one of the loop's."""
         self._link, self._forms, self._went_on = link, forms, went_on
-        self._begun: Begun | None = None
+        self._begun: BegunStop | None = None
         """The stop that another thread has begun and the loop has not yet taken over."""
         self._last: StopForms | None = None
         """The forms of the last stop."""
@@ -114,7 +114,7 @@ class StopAhead:
         owed = last.pieces if last is not None else line.owed_pieces()
         pieces = merged([] if of_some else owed, forms.repeats)
         written = last.written if last is not None else []
-        self._begun = begun = Begun(forms, data, now, pieces, written, invalidates, before)
+        self._begun = begun = BegunStop(forms, data, now, pieces, written, invalidates, before)
         line.overtaken = True
         return begun.wrote(data, now, line.byte_time)
 
@@ -127,7 +127,7 @@ class StopAhead:
             return None
         line, begun = self._link.line, self._begun
         if begun is None:
-            begun = Begun(forms, forms.immediate, line.transmitted, line.owed_pieces())
+            begun = BegunStop(forms, forms.immediate, line.transmitted, line.owed_pieces())
         now = self._link.now()
         free = not waiting and now >= begun.clear(line.byte_time)
         if free and not begun.goes_on():
@@ -141,14 +141,14 @@ class StopAhead:
         begun = self._begun or self._of_the_loop()
         if begun is not None and self._link.transport.preemptible:
             due = begun.due(self._link.line.byte_time) - self._link.now()
-            pacing.PACER.after(self, due if due > 0 else AGAIN, self._go_on)
+            pacing.PACER.after(self, due if due > 0 else RETRY_AFTER, self._go_on)
 
-    def _of_the_loop(self) -> Begun | None:
+    def _of_the_loop(self) -> BegunStop | None:
         """The stop of which the loop has still to write pieces; None: it has written all, or something else since."""
         line = self._link.line
         if self._last is None or not line.only_stop or not (pieces := line.owed_pieces()):
             return None
-        return Begun(self._last, self._last.immediate, line.transmitted, pieces, stops_all=line.stops_all)
+        return BegunStop(self._last, self._last.immediate, line.transmitted, pieces, stops_all=line.stops_all)
 
     def _go_on(self) -> None:
         """Write the next piece if the loop does not."""
@@ -182,7 +182,7 @@ class StopAhead:
         self._begun, self._link.line.overtaken = begun, True
         return data
 
-    def _due_piece(self, begun: Begun, waiting: int) -> bytes:
+    def _due_piece(self, begun: BegunStop, waiting: int) -> bytes:
         byte_time, now = self._link.line.byte_time, self._link.now()
         if waiting or now < begun.due(byte_time):
             return b""
@@ -199,12 +199,12 @@ class StopAhead:
         """Forget what was begun: it went to a transport that is lost."""
         self._begun = None
 
-    def take(self, followed: bool) -> Begun | None:
+    def take(self, followed: bool) -> BegunStop | None:
         """Take over what was begun; before the last key is followed, only that there is such a stop.
 
         `followed`: this follows a key. The loop writes nothing before it has followed every one.
         """
-        taken: Begun | None = None
+        taken: BegunStop | None = None
 
         def note(last: bool) -> None:
             nonlocal taken

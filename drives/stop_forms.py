@@ -34,7 +34,7 @@ class StopForms:
     @property
     def pieces(self) -> tuple[StopPiece, ...]:
         """All of it in pieces: for a stop that follows another one, and must not be written at once."""
-        if any(each.data == self.immediate for each in self.repeats):
+        if any(repeat.data == self.immediate for repeat in self.repeats):
             return self.repeats
         return (StopPiece(self.immediate, self.gap), *self.repeats)
 
@@ -85,7 +85,7 @@ def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms
         if failed:
             missed += drives
     if len(soon) > 1:
-        soon = [[each for pieces in zip_longest(*soon) for each in pieces if each is not None]]
+        soon = [[piece for pieces in zip_longest(*soon) for piece in pieces if piece is not None]]
     repeats = (*(soon[0] if soon else ()), *late, *(roster.sweep if only is None else ()))
     joined = b"".join
     return StopForms(joined(immediate), joined(unterminated), repeats, joined(invalidate), framed, tuple(missed), gap)

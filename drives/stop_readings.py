@@ -46,11 +46,11 @@ async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Acti
     if drive.programming and not drive.engaged:
         return NOTHING, "its velocity cannot be read in program mode"
     try:
-        found = await drive.motion()
+        motions = await drive.motion()
         assert drive.seen is not None
         at = drive.seen.transmitted_at
-        runs, why = found[0].program, ""
-        if runs is None and not any(axis.velocity for axis in found):  # a drive that moves is stopped again
+        runs, why = motions[0].program, ""
+        if runs is None and not any(axis.velocity for axis in motions):  # a drive that moves is stopped again
             try:
                 runs = await drive.busy()
             except Stopped:
@@ -61,11 +61,13 @@ async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Acti
         return ENDLESS, ""
     except (TimeoutError, DriveError, TransportLost) as error:
         return NOTHING, f"its velocity could not be read: {error}"
-    for each in found:
-        drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
-    speeds = zip(found, drive.seen.velocities, strict=True) if drive.seen is not None and not why else ()
+    for motion in motions:
+        drive.link.publish(
+            Sample(at, drive.address, motion.position, motion.velocity, motion.axis, motion.trouble, runs)
+        )
+    speeds = zip(motions, drive.seen.velocities, strict=True) if drive.seen is not None and not why else ()
     # The only axis of a drive has no name, whatever number its lines give it.
     speed = max((abs(each) for axis, each in speeds if axes is None or not axis.axis or axis.axis in axes), default=0)
-    counts = [each for each in found if axes is None or not each.axis or each.axis in axes]
-    places = "" if why else ", ".join(str(each.position) for each in counts)
+    counts = [motion for motion in motions if axes is None or not motion.axis or motion.axis in axes]
+    places = "" if why else ", ".join(str(count.position) for count in counts)
     return Activity(speed, bool(runs) and not why, places), why

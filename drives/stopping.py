@@ -25,16 +25,16 @@ from multidrop.drives.halts import Fate as Fate
 from multidrop.drives.halts import Halt as Halt
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
-from multidrop.drives.stop_ahead import Begun, StopAhead
+from multidrop.drives.stop_ahead import BegunStop, StopAhead
 from multidrop.drives.stop_forms import StopForms, single_forms, stop_forms
 from multidrop.drives.stop_readings import ENDLESS, Activity, read_activity
 
-TRIES = 3
+STOP_TRIES = 3
 BETWEEN = 0.1
 """Time between two readings of a drive that may be slowing down, s."""
 RAMP = 30.0
 """How long a drive is read that slows down, or was stopped in vain, s."""
-AGAIN = 3
+MOST_STORED_STOPS = 3
 """How often a stop is written again for a drive that stored it."""
 
 
@@ -121,7 +121,7 @@ class Stopping:
                 link.line.put_first(written.first)
             self._note_written(written)
             if halt.single:
-                link.debris.stop_written(b"".join(each.data for each in written.pieces), link.line.transmitted)
+                link.debris.stop_written(b"".join(piece.data for piece in written.pieces), link.line.transmitted)
             for drive in halt.affected:
                 if not halt.spares_programs(drive):
                     halt.programs.setdefault(drive, _ran(drive, halt))
@@ -136,7 +136,7 @@ class Stopping:
         if not halt.whole:
             conversations.stop(drive.state for drive in halt.affected)
 
-    def _note_written(self, begun: Begun) -> None:
+    def _note_written(self, begun: BegunStop) -> None:
         line = self._link.line
         for when, data in begun.written:
             line.wrote(data, when, whole=not begun.stops_all or (begun.invalidates and data == begun.data))
@@ -162,26 +162,26 @@ class Stopping:
         others = [drive for drive in self._roster.all_drives if drive not in drives]
         return tuple(drive for drive in others if _hears(drive.state, data))
 
-    def _write_single(self, halt: Halt, usual: StopForms) -> Begun | None:
+    def _write_single(self, halt: Halt, usual: StopForms) -> BegunStop | None:
         """Write a stop of what was started, behind what leaves; None where the usual one stops no more, or must.
 
         Nothing that is on its way is dropped: a line that is cut off needs the usual stop.
         """
         data = usual.immediate
-        reaches_more = self._reached(halt.drives, data) or any(each.codec.stops_unknown(data) for each in halt.drives)
+        reaches_more = self._reached(halt.drives, data) or any(drive.codec.stops_unknown(data) for drive in halt.drives)
         if not (reaches_more or any(map(halt.spares_programs, halt.drives))):
             return None
         forms, link, now = single_forms(halt.started), self._link, self._link.now()
         if forms is None or link.away or link.transport.pending:
             return None
-        begun = Begun(forms, forms.immediate, now, [*forms.repeats], stops_all=False)
+        begun = BegunStop(forms, forms.immediate, now, [*forms.repeats], stops_all=False)
         return begun if link.transport.write(begun.wrote(begun.data, now, link.line.byte_time)) else None
 
-    def _write_now(self, halt: Halt) -> Begun:
+    def _write_now(self, halt: Halt) -> BegunStop:
         """Drop what is unsent and write a stop. One that is still leaving is dropped by one of all drives alone."""
         link, forms, now = self._link, stop_forms(self._roster, None if halt.whole else halt.drives), self._link.now()
         line = link.line
-        under_way = Begun(forms, forms.immediate, line.transmitted, [*forms.pieces], stops_all=halt.whole)
+        under_way = BegunStop(forms, forms.immediate, line.transmitted, [*forms.pieces], stops_all=halt.whole)
         leaving = line.only_stop and (link.transport.pending or now < under_way.clear(line.byte_time))
         leaving = leaving and (line.stops_all or not halt.whole)  # a stop of some drives holds up none of all
         halt.single = bool(halt.started) and not leaving
@@ -267,7 +267,7 @@ class Stopping:
         if halt is None:
             halt = self.halt([drive])
             self.halted(halt)
-        elif drive.programming and halt.stored.count(drive) < AGAIN:
+        elif drive.programming and halt.stored.count(drive) < MOST_STORED_STOPS:
             halt.stored.append(drive)
             text = f"{drive.shown}: it stored the stop; its download is ended and the whole stop sent again"
             self._link.notify(text, warning=True)
@@ -290,58 +290,66 @@ class Stopping:
         active: dict[Drive, Activity] = {}
         tries, until = 0, link.now() + RAMP
         while unconfirmed and link.now() < until:
-            found = {drive: await self._read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
+            activities = {
+                drive: await self._read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)
+            }
             if self.last is not None and self.last.number > halt.number:
                 return  # a later stop of the whole link confirms it, by what is read after that
-            for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
-                if each.places and each.none and halt.fate(drive) is Fate.STANDING:
-                    link.notify(f"{drive.shown}{halt.part_of(drive)}: stopped, velocity 0 at {each.places}")
-            active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
-            slow_down = all(each.lessens(before.get(drive), halt.single) for drive, each in active.items())
-            before = found
-            if halt.single and any(drive in halt.doubts for drive in found) and not link.lost:
+            for drive, activity in activities.items():  # whether this reading or a poll after it has confirmed that
+                if activity.places and activity.none and halt.fate(drive) is Fate.STANDING:
+                    link.notify(f"{drive.shown}{halt.part_of(drive)}: stopped, velocity 0 at {activity.places}")
+            active = {
+                drive: activity
+                for drive, activity in activities.items()
+                if not activity.none and not halt.started_since(drive)
+            }
+            slow_down = all(activity.lessens(before.get(drive), halt.single) for drive, activity in active.items())
+            before = activities
+            if halt.single and any(drive in halt.doubts for drive in activities) and not link.lost:
                 self._repeat(halt)  # as the usual stop
                 unconfirmed = list(halt.affected)
                 continue
-            if active and not slow_down and tries < TRIES and not link.lost:
+            if active and not slow_down and tries < STOP_TRIES and not link.lost:
                 tries += 1
                 self._once_more(halt, active, tries)
             # The line of an operator that may start a drive may also be refused, and then nothing has started it.
             undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
-            once = [drive for drive, each in found.items() if each.none and halt.fate(drive) is Fate.SENT]
+            once = [drive for drive, activity in activities.items() if activity.none and halt.fate(drive) is Fate.SENT]
             unconfirmed = [*active, *undecided, *once]
             if unconfirmed:
                 await asyncio.sleep(BETWEEN)
-        if active and tries < TRIES:
+        if active and tries < STOP_TRIES:
             names = ", ".join(drive.shown for drive in active)
             link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
 
     async def _read(self, drive: Drive, halt: Halt) -> Activity:
         """Read what a drive does; where that cannot be read, it is a doubt of the stop."""
         spares = halt.spares_programs(drive)
-        found, why = await read_activity(drive, halt.started[drive].axes if spares else None)
+        activity, why = await read_activity(drive, halt.started[drive].axes if spares else None)
         if why:
             halt.doubts[drive] = why
             drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
-        elif found is not ENDLESS:
+        elif activity is not ENDLESS:
             halt.doubts.pop(drive, None)
-        if spares and halt.single and not why and found is not ENDLESS:
-            halt.rests[drive] = 0 if found.speed else halt.rests.get(drive, 0) + 1
-            return found._replace(runs=False)
-        return found
+        if spares and halt.single and not why and activity is not ENDLESS:
+            halt.rests[drive] = 0 if activity.speed else halt.rests.get(drive, 0) + 1
+            return activity._replace(runs=False)
+        return activity
 
     def _once_more(self, halt: Halt, active: Mapping[Drive, Activity], tries: int) -> None:
         """Stop again what goes on, or give up and say so."""
-        if tries == TRIES:
+        if tries == STOP_TRIES:
             halt.vain = True
             for goes_on, moves in (("MOVING", True), ("RUNNING", False)):
-                if names := ", ".join(drive.shown for drive, each in active.items() if bool(each.speed) is moves):
-                    text = f"STILL {goes_on} after {TRIES} stops: {names}; cut the power"
+                if names := ", ".join(
+                    drive.shown for drive, activity in active.items() if bool(activity.speed) is moves
+                ):
+                    text = f"STILL {goes_on} after {STOP_TRIES} stops: {names}; cut the power"
                     halt.link.notify(text, warning=True)
             return
-        for drive, each in active.items():
-            does = f"still moves at {each.speed} a second" if each.speed else "its program still runs"
-            does = "a stop kept its velocity from being read" if each is ENDLESS else does
+        for drive, activity in active.items():
+            does = f"still moves at {activity.speed} a second" if activity.speed else "its program still runs"
+            does = "a stop kept its velocity from being read" if activity is ENDLESS else does
             halt.link.notify(f"{drive.shown}: {does}; stop sent again", warning=True)
         self._repeat(halt)
 

@@ -27,7 +27,7 @@ from multidrop.base.errors import DriveError, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Motion, Priority
 from multidrop.dialects.values import Part
 from multidrop.dialects.values import Value as Fact
-from multidrop.drives.drive import Drive, Running
+from multidrop.drives.drive import Drive, ProgramReading
 from multidrop.drives.events import Conditioned, Sample, Silent, Valued
 from multidrop.drives.poller import Due, Poller
 from multidrop.drives.poller import Subscription as Subscription
@@ -36,11 +36,11 @@ from multidrop.drives.roster import Roster
 
 MODEST = 0.02
 """Default period of a drive's motion, s: a screen shows no more, and others need the wire."""
-FASTEST = 0.001
+SHORTEST_PERIOD = 0.001
 """Shortest period of a drive's motion, s: a simulated wire without a baud rate has no other limit."""
-USUAL = 0.05
+READ_PERIOD = 0.05
 """Default period of a value, s."""
-PERIOD = 1.0
+WATCH_PERIOD = 1.0
 """Default period of a drive's conditions, s."""
 RATE_OVER = 2.0
 """Time over which the rate is averaged, s."""
@@ -50,11 +50,11 @@ AGED = 30
 """Periods after which settings are read again."""
 SCALES = 5
 """Periods between two readings of what the scales of a drive rest on."""
-LEAST = 3.0
+LEAST_AGE = 3.0
 """Seconds between two readings of a setting, however many commands are sent."""
 
 
-class Value(NamedTuple):
+class DriveValue(NamedTuple):
     """A value by the address of its drive and its word."""
 
     address: str
@@ -64,7 +64,7 @@ class Value(NamedTuple):
 class _MotionPoller(Poller[str]):
     """Polls position and velocity of drives, by address."""
 
-    shortest = FASTEST
+    shortest = SHORTEST_PERIOD
     retry = 0.02
 
     def __init__(self, roster: Roster) -> None:
@@ -103,7 +103,7 @@ class _MotionPoller(Poller[str]):
         self._link.publish(Silent(self._link.now(), thing))
 
 
-class _ValuePoller(Poller[Value]):
+class _ValuePoller(Poller[DriveValue]):
     """Polls values by their words, which a person named."""
 
     shortest = 0.002
@@ -113,22 +113,22 @@ class _ValuePoller(Poller[Value]):
         super()._count()
         self._due = {value: self._due[value] for value in self.periods}
 
-    def _drive(self, thing: Value) -> Drive:
+    def _drive(self, thing: DriveValue) -> Drive:
         return self._roster.at(thing.address)
 
-    def _begin(self, thing: Value, due: Due, drive: Drive) -> None:
+    def _begin(self, thing: DriveValue, due: Due, drive: Drive) -> None:
         procedure = drive.family.values.again(thing.word, Priority.POLL)
         self._converse(thing, due, partial(drive.start, procedure, typed=True), self._took)
 
-    def _took(self, value: Value, at: float, read: float) -> None:
+    def _took(self, value: DriveValue, at: float, read: float) -> None:
         self._set_timer(self._link.now())
         self._link.publish(Valued(at, value.address, value.word, read))
 
-    def _silent(self, thing: Value, due: Due) -> None:
+    def _silent(self, thing: DriveValue, due: Due) -> None:
         if due.refusals >= NAKS:
             self._refused(thing, due, f"{self._drive(thing).shown}: NAK to '{thing.word}'")
 
-    def _refused(self, thing: Value, due: Due, why: str) -> None:
+    def _refused(self, thing: DriveValue, due: Due, why: str) -> None:
         """Read a value no longer, and say so once: each refusal may start a subroutine for errors in the drive."""
         due.at = inf
         self._link.notify(f"{why}; it is not read again", thing.address, warning=True)
@@ -221,8 +221,10 @@ class _ConditionPoller(Poller[str]):
             await self._read_scales(known)
         if ready and known.facts:
             conditions = drive.family.values.fold(known.facts)
-            if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
-                drive.running = Running(begun, runs)
+            if (
+                runs := next((condition.runs for condition in conditions if condition.runs is not None), None)
+            ) is not None:
+                drive.running = ProgramReading(begun, runs)
             self._link.publish(Conditioned(self._link.now(), drive.address, conditions))
 
     def _barred(self, drive: Drive) -> bool:
@@ -245,7 +247,7 @@ class _ConditionPoller(Poller[str]):
             return False
         at, commands = known.read.get(part.name, (-inf, -1))
         age = self._link.now() - at
-        return not part.slow or age > AGED * period or (age > LEAST and commands != known.drive.commands)
+        return not part.slow or age > AGED * period or (age > LEAST_AGE and commands != known.drive.commands)
 
     async def _read_part(self, known: _Facts, due: Due, part: Part) -> bool:
         """Read one part; return whether the next may follow."""
@@ -254,10 +256,10 @@ class _ConditionPoller(Poller[str]):
         drive = known.drive
         commands = drive.commands
         try:
-            found = await drive.run(part.read())
-            known.facts |= found
+            values = await drive.run(part.read())
+            known.facts |= values
             if part.slow:
-                drive.settings[part.name] = (found, commands)
+                drive.settings[part.name] = (values, commands)
         except Refused:
             known.refused.add(part.name)
         except NoAnswer:
@@ -282,11 +284,11 @@ class Telemetry:
         """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
         return self._motion.subscribe(addresses, period)
 
-    def read(self, values: Sequence[Value], period: float = USUAL) -> Subscription[Value]:
+    def read(self, values: Sequence[DriveValue], period: float = READ_PERIOD) -> Subscription[DriveValue]:
         """Read values by their words, which `dialects.values` has checked, each every `period` s beside the polls."""
         return self._values.subscribe(values, period)
 
-    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
+    def watch(self, addresses: Sequence[str], period: float = WATCH_PERIOD) -> Subscription[str]:
         """Read the conditions of these drives every `period` s, between the polls."""
         return self._conditions.subscribe(addresses, period)
 
@@ -300,14 +302,14 @@ class Telemetry:
 
     def pause(self) -> None:
         """Begin no poll until `resume`."""
-        for each in self._pollers:
-            each.pause()
+        for poller in self._pollers:
+            poller.pause()
 
     def resume(self) -> None:
-        for each in self._pollers:
-            each.resume()
+        for poller in self._pollers:
+            poller.resume()
 
     def close(self) -> None:
         """End all polling."""
-        for each in self._pollers:
-            each.close()
+        for poller in self._pollers:
+            poller.close()

@@ -3,8 +3,8 @@
 from multidrop.macros.model import FIRST_PAGE as FIRST_PAGE
 from multidrop.macros.model import KEYS as KEYS
 from multidrop.macros.model import Macro as Macro
-from multidrop.macros.model import Parameter as Parameter
-from multidrop.macros.model import Step as Step
+from multidrop.macros.model import MacroParameter as MacroParameter
+from multidrop.macros.model import MacroStep as MacroStep
 from multidrop.macros.model import check as check
 from multidrop.macros.model import check_name as check_name
 from multidrop.macros.model import checked_values as checked_values

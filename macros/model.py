@@ -61,7 +61,7 @@ def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
 
 
 Value = int | float | str
-LARGEST = 10**15
+LARGEST_NUMBER = 10**15
 """The largest magnitude of a number."""
 _PLACE = re.compile(r"\{\{|\}\}|\{(?P<name>[A-Za-z0-9_-]+)(?::(?P<type>[^{}]*))?\}")
 _TYPE = re.compile(r"\s*(?P<kind>int|float|text|choice\((?P<choices>[^()]*)\))\s*(?:=(?P<default>.*?))?\s*", re.DOTALL)
@@ -76,7 +76,7 @@ _USAGE = "valid: {NAME:int=10,1..100}, float, text, choice(a|b)"
 
 
 @dataclass(frozen=True)
-class Parameter:
+class MacroParameter:
     """A value that a macro takes. `default` None: it must be given. `low`, `high` None: no limit."""
 
     name: str
@@ -116,8 +116,8 @@ class Parameter:
             number = int(text) if self.kind == "int" else float(text)
             if _digits(written(number)) != _digits(text):
                 raise Diagnostic(f"{self.name} = {text} has more digits than are kept", where, f"as {written(number)}")
-            low = -LARGEST if self.low is None else self.low
-            if low <= number <= (LARGEST if self.high is None else self.high):
+            low = -LARGEST_NUMBER if self.low is None else self.low
+            if low <= number <= (LARGEST_NUMBER if self.high is None else self.high):
                 return number
         elif (self.kind == "text" and visible(text) == text) or (self.kind == "choice" and text in self.choices):
             return text
@@ -145,14 +145,14 @@ def plain(line: str) -> str:
     return _PLACE.sub(lambda match: f"{{{match['name']}}}" if match["name"] else match[0], line)
 
 
-def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
+def declared(lines: Sequence[tuple[str, str]]) -> tuple[MacroParameter, ...]:
     """The parameters of lines, each line with its place, in the order of the lines.
 
     A plain `{NAME}` that a `/set` of these lines sets is not a parameter. Raises Diagnostic for a wrong type, and where
     two lines give a name different ones.
     """
     own = {match["name"] for _, line in lines if (match := _SET.match(line.strip()))}
-    found: dict[str, tuple[Parameter, str]] = {}
+    parameters: dict[str, tuple[MacroParameter, str]] = {}
     plain_ones: dict[str, None] = {}
     for where, line in lines:
         for match in _PLACE.finditer(line):
@@ -161,15 +161,19 @@ def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
             if match["type"] is None:
                 continue
             parameter = _defined(name, match["type"], f"{where}: {match[0]}")
-            before, first = found.setdefault(name, (parameter, where))
+            before, first = parameters.setdefault(name, (parameter, where))
             if before != parameter:
                 hint = f"write {{{name}}} in one of them, or the same type in both"
                 place = first.rpartition(", ")[2].rpartition(": ")[2]
                 raise Diagnostic(f"{match[0]} differs from {name} in {place}", where, hint)
-    return tuple(found[n][0] if n in found else Parameter(n) for n in plain_ones if n in found or n not in own)
+    return tuple(
+        parameters[n][0] if n in parameters else MacroParameter(n)
+        for n in plain_ones
+        if n in parameters or n not in own
+    )
 
 
-def _defined(name: str, text: str, where: str) -> Parameter:
+def _defined(name: str, text: str, where: str) -> MacroParameter:
     """Parse `TYPE=DEFAULT,LOW..HIGH`."""
     limits = None if text.lstrip().startswith("text") else _LIMITS.fullmatch(text)
     match = _TYPE.fullmatch(limits["head"] if limits else text)
@@ -182,16 +186,16 @@ def _defined(name: str, text: str, where: str) -> Parameter:
         raise Diagnostic("invalid choices", where, "valid: choice(a|b), each word once, without limits")
     ends: list[int | float | None] = []
     for end in ("low", "high"):
-        limit = Parameter("limit", kind).take(limits[end], where) if limits and limits[end] else None
+        limit = MacroParameter("limit", kind).take(limits[end], where) if limits and limits[end] else None
         assert not isinstance(limit, str)  # no text and no choice has limits
         ends.append(limit)
     low, high = ends
     if low is not None and high is not None and low > high:
         raise Diagnostic(f"no value from {written(low)} to {written(high)}", where, "write the lower limit first")
-    parameter = Parameter(name, kind, None, low, high, choices)
+    parameter = MacroParameter(name, kind, None, low, high, choices)
     if match["default"] is None:
         return parameter
-    return Parameter(name, kind, parameter.take(match["default"].strip(), where), low, high, choices)
+    return MacroParameter(name, kind, parameter.take(match["default"].strip(), where), low, high, choices)
 
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")
@@ -208,7 +212,7 @@ At = Callable[[str, int], str]
 
 
 @dataclass(frozen=True)
-class Step:
+class MacroStep:
     """One line, run `after` seconds after the start of the step before.
 
     `drive` and `replies` are what was recorded; they are read by people, and never sent.
@@ -225,7 +229,7 @@ class Macro:
     """Steps under a name, and the function key that plays them (empty: none)."""
 
     name: str
-    steps: tuple[Step, ...]
+    steps: tuple[MacroStep, ...]
     key: str = ""
     note: str = ""
     page: str = FIRST_PAGE
@@ -240,7 +244,7 @@ class Macro:
     """The time of the recording."""
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[MacroParameter, ...]:
         """The values that its lines take, in the order of the lines. Raises Diagnostic where they are wrong."""
         return declared(list(self._numbered()))
 
@@ -260,14 +264,14 @@ class Macro:
     @property
     def values(self) -> str:
         """The values and roles that it takes, in words. Raises Diagnostic where they are wrong."""
-        values = f"values: {', '.join(each.summary for each in self.parameters)}" if self.parameters else ""
+        values = f"values: {', '.join(parameter.summary for parameter in self.parameters)}" if self.parameters else ""
         roles = f"roles: {', '.join(self.roles)}" if self.roles else ""
         return "  ".join(filter(None, (values, roles)))
 
     @property
     def summary(self) -> str:
         """Name, key, length, values, roles and note in one line."""
-        parts = [each for each in (self.length, self.values) if each]
+        parts = [part for part in (self.length, self.values) if part]
         return f"{self.name:<16} {self.place or '-':<4} {'  '.join(parts)}  {self.note}".rstrip()
 
     def where(self, number: int) -> str:
@@ -287,17 +291,17 @@ def checked_values(macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
     Raises Diagnostic for a value that no line takes, that is wrong or missing, or with which a line would be another
     one's: nothing may begin a verb, or name a drive, but the line itself.
     """
-    parameters = {each.name: each for each in macro.parameters}
+    parameters = {parameter.name: parameter for parameter in macro.parameters}
     for name in given:
         if name not in parameters:
             hint = f"valid: {', '.join(parameters)}" if parameters else "the macro takes no values"
             raise Diagnostic(f"no line takes the value {name}", f"macro {macro.name}", hint)
     values = {}
-    for name, each in parameters.items():
-        value = each.take(given[name], f"macro {macro.name}") if name in given else each.default
+    for name, parameter in parameters.items():
+        value = parameter.take(given[name], f"macro {macro.name}") if name in given else parameter.default
         if value is None:
             where = next(place for place, line in macro._numbered() if name in value_names(plain(line)))
-            kind = "" if each.kind == "text" else f" ({each.valid})"
+            kind = "" if parameter.kind == "text" else f" ({parameter.valid})"
             raise Diagnostic(f"no value for {{{name}}}", where, f"set {name}=VALUE{kind}, or write {{{{ for a brace")
         values[name] = written(value)
     for where, line in macro._numbered():
@@ -313,8 +317,8 @@ def filled(macro: Macro, given: Mapping[str, str]) -> tuple[str, ...]:
     return tuple(fill(line, _with_own(line, values)) for line in macro.lines)
 
 
-def missing(macro: Macro, given: Mapping[str, str]) -> list[Parameter]:
-    return [each for each in macro.parameters if each.default is None and each.name not in given]
+def missing(macro: Macro, given: Mapping[str, str]) -> list[MacroParameter]:
+    return [parameter for parameter in macro.parameters if parameter.default is None and parameter.name not in given]
 
 
 def _with_own(line: str, values: Mapping[str, str]) -> dict[str, str]:
@@ -358,7 +362,7 @@ def check(macro: Macro, where: str = "", at: At | None = None) -> None:
     for number, line in enumerate(macro.on_early_end, 1):
         _check_line(line, f"on_early_end {number}", at("on_early_end", 0))
     try:
-        names = {each.name for each in macro.parameters}
+        names = {parameter.name for parameter in macro.parameters}
     except Diagnostic as problem:  # a step is named by its number, as the lines count
         place = problem.where.partition(", ")[2]
         step_number = re.match(r"step (\d+)", place)

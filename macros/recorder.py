@@ -14,22 +14,22 @@ from dataclasses import dataclass, field, replace
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import visible
-from multidrop.macros.model import Macro, Step, check_name, escape
+from multidrop.macros.model import Macro, MacroStep, check_name, escape
 
 LONG = 1.0
 """The shortest pause in whose place a wait is offered, s."""
 REACTION = 5.0
 """The time in which a person reacts to what ended the pause, s."""
-LEAST = 10
+SHORTEST_WAIT = 10
 """The shortest time limit of a wait that is offered, s."""
-KEPT = 10_000
+MOST_KEPT_EVENTS = 10_000
 """The number of events that are kept of each kind."""
 _FIXED = re.compile(r"[^\d\"'{}\s][^\d\"'{}]*")
 _WAITS = ("/wait", "/sleep")
 
 
 @dataclass(frozen=True)
-class Offer:
+class WaitOffer:
     """A wait in place of the pause before a step; steps count from 1."""
 
     step: int
@@ -45,16 +45,16 @@ class Offer:
 class Observed:
     """The actions of drives during a recording, with times, s."""
 
-    texts: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=KEPT))
+    texts: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=MOST_KEPT_EVENTS))
     """Each line that a drive printed by itself."""
-    inputs: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=KEPT))
+    inputs: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=MOST_KEPT_EVENTS))
     """Each change of an input, as a condition: `@press:a I1=1`."""
-    moving: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=KEPT))
+    moving: deque[tuple[float, bool]] = field(default_factory=lambda: deque(maxlen=MOST_KEPT_EVENTS))
     """Each reading of a velocity: whether it was not 0."""
 
 
-def offers(lines: Sequence[Recorded], observed: Observed) -> list[Offer]:
-    found, moved = [], False
+def offers(lines: Sequence[Recorded], observed: Observed) -> list[WaitOffer]:
+    waits, moved = [], False
     for number, (before, line) in enumerate(zip(lines, lines[1:], strict=False), 2):
         waited = _is_wait(before)
         moved = before.starts or (moved and not waited)
@@ -62,18 +62,18 @@ def offers(lines: Sequence[Recorded], observed: Observed) -> list[Offer]:
             continue
         if wait := _ended_by(before.at, line.at, moved, observed):
             pause = line.at - before.at
-            found.append(Offer(number, f"{wait} {max(LEAST, math.ceil(3 * pause))}", pause))
+            waits.append(WaitOffer(number, f"{wait} {max(SHORTEST_WAIT, math.ceil(3 * pause))}", pause))
             moved = False
-    return found
+    return waits
 
 
-def with_waits(macro: Macro, found: Sequence[Offer]) -> Macro:
+def with_waits(macro: Macro, found: Sequence[WaitOffer]) -> Macro:
     """The macro with the waits in place of those pauses."""
     waits = {offer.step: offer.line for offer in found}
-    steps: list[Step] = []
+    steps: list[MacroStep] = []
     for number, step in enumerate(macro.steps, 1):
         if number in waits:
-            steps.append(Step(0.0, escape(waits[number])))
+            steps.append(MacroStep(0.0, escape(waits[number])))
             step = replace(step, after=0.0)
         steps.append(step)
     return replace(macro, steps=tuple(steps))
@@ -99,7 +99,7 @@ def _is_wait(line: Recorded) -> bool:
 
 REPLIES = 20
 """The number of replies that a step keeps."""
-LONGEST = 200
+LONGEST_KEPT_TEXT = 200
 """The characters of a reply that a step keeps."""
 
 
@@ -121,7 +121,9 @@ class Recorded:
         """The replies, cut to a length that people read."""
         kept = []
         for text in map(visible, self.heard[:REPLIES]):
-            kept.append(text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} characters)")
+            kept.append(
+                text if len(text) <= LONGEST_KEPT_TEXT else f"{text[:LONGEST_KEPT_TEXT]}... ({len(text)} characters)"
+            )
         more = len(self.heard) - REPLIES
         return (*kept, *([f"... {more} more"] if more > 0 else []))
 
@@ -173,14 +175,16 @@ class Recorder:
             raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not stored; record it again")
         first = before = self._recorded[0].at
         steps = []
-        for each in self._recorded:  # offsets from the first line are rounded, not gaps: a long macro does not drift
-            gap = round(each.at - first, 3) - round(before - first, 3)
-            steps.append(Step(max(0.0, round(gap, 3)), each.line, each.drive, each.replies))
-            before = each.at
+        for (
+            recorded
+        ) in self._recorded:  # offsets from the first line are rounded, not gaps: a long macro does not drift
+            gap = round(recorded.at - first, 3) - round(before - first, 3)
+            steps.append(MacroStep(max(0.0, round(gap, 3)), recorded.line, recorded.drive, recorded.replies))
+            before = recorded.at
         return Macro(name, tuple(steps), recorded=self._begun)
 
     @property
-    def offers(self) -> list[Offer]:
+    def offers(self) -> list[WaitOffer]:
         return offers(self._recorded, self.observed)
 
     def discard(self) -> None:

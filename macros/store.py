@@ -63,14 +63,14 @@ class MacroStore:
 
     def _names_in(self, folder: Path) -> set[str]:
         try:
-            found = {entry.stem for entry in folder.iterdir() if entry.suffix == ".toml"}
+            names = {entry.stem for entry in folder.iterdir() if entry.suffix == ".toml"}
         except FileNotFoundError:
             return set()
         except OSError as error:
             if folder == self.project and isinstance(error, NotADirectoryError):
                 return set()
             raise _unreadable(folder, error) from None
-        return {name for name in found if not name.startswith(".")}
+        return {name for name in names if not name.startswith(".")}
 
     def load(self, name: str) -> Macro:
         return self._loaded(name)[0]
@@ -108,8 +108,8 @@ class MacroStore:
 
     def on_key(self, key: str, page: str = FIRST_PAGE) -> tuple[list[Macro], list[Diagnostic]]:
         """Every macro on a key of a page, and the problems of the files that are unreadable."""
-        found, broken = self._read()
-        return [macro for macro in found if (macro.key, macro.page) == (key.upper(), page)], broken
+        macros, broken = self._read()
+        return [macro for macro in macros if (macro.key, macro.page) == (key.upper(), page)], broken
 
     def pages(self) -> list[str]:
         """The pages with a macro on a key, the first one always; unreadable files are left out."""
@@ -129,13 +129,13 @@ class MacroStore:
         ]
 
     def _read(self) -> tuple[list[Macro], list[Diagnostic]]:
-        found, broken = [], []
+        macros, broken = [], []
         for name in self.names():
             try:
-                found.append(self.load(name))
+                macros.append(self.load(name))
             except Diagnostic as problem:
                 broken.append(problem)
-        return found, broken
+        return macros, broken
 
     def save(self, macro: Macro, before: bytes | None = None) -> Path:
         """Write the macro's file, whole or not at all; return its path.
@@ -261,7 +261,7 @@ def _unreadable(path: Path, error: OSError) -> Diagnostic:
     return Diagnostic(f"cannot read it ({error.strerror or error})", str(path))
 
 
-class Listing(NamedTuple):
+class MacroListing(NamedTuple):
     """A line for each macro, the warnings about them, and the problems of the files that cannot be read."""
 
     lines: list[str]
@@ -269,7 +269,7 @@ class Listing(NamedTuple):
     broken: list[Diagnostic]
 
 
-def listed(store: MacroStore) -> Listing:
+def listed(store: MacroStore) -> MacroListing:
     """List the macros: name, key and page, length, values, roles, note; and which are beside the project."""
     lines, broken = [], list[Diagnostic]()
     for name in store.names():
@@ -279,10 +279,10 @@ def listed(store: MacroStore) -> Listing:
             broken.append(problem)
         else:
             lines.append(f"{summary}  [{store.project}]" if store.is_project(name) else summary)
-    return Listing(lines, [*store.clashes(), *store.hidden()], broken)
+    return MacroListing(lines, [*store.clashes(), *store.hidden()], broken)
 
 
-class Draft(NamedTuple):
+class MacroDraft(NamedTuple):
     """A copy that is being edited."""
 
     name: str
@@ -293,7 +293,7 @@ class Draft(NamedTuple):
     """A notice for the person before the edit."""
 
 
-def begin_draft(store: MacroStore, folder: Path, name: str) -> Draft:
+def begin_draft(store: MacroStore, folder: Path, name: str) -> MacroDraft:
     """Make a draft of a macro, or find the one that is left. Raises Diagnostic for an unknown macro."""
     current = store.contents(name)
     if current is None:
@@ -303,21 +303,21 @@ def begin_draft(store: MacroStore, folder: Path, name: str) -> Draft:
     try:
         if file.exists() and kept.exists() and kept.read_bytes() == current:
             changed = file.read_bytes() != current
-            return Draft(name, file, current, f"goes on with the text of the last edit, {file}" if changed else "")
+            return MacroDraft(name, file, current, f"goes on with the text of the last edit, {file}" if changed else "")
         remark = ""
         if file.exists():  # a draft of a macro that has changed since: it stays under another name
             number = next(n for n in range(1, 10_000) if not file.with_suffix(f".{n}.toml").exists())
             other = file.rename(file.with_suffix(f".{number}.toml"))
             remark = f"{name} has changed since the last edit, whose text is in {other}"
-        for each in (kept, file):
-            write_atomically(each, current, 0o600)
+        for path in (kept, file):
+            write_atomically(path, current, 0o600)
     except OSError as error:
         what = f"cannot write the copy ({error.strerror or error})"
         raise Diagnostic(what, str(file), f"{name} is as it was") from None
-    return Draft(name, file, current, remark)
+    return MacroDraft(name, file, current, remark)
 
 
-def finish_draft(store: MacroStore, draft: Draft) -> str:
+def finish_draft(store: MacroStore, draft: MacroDraft) -> str:
     """Put the text of a draft in place of the macro; return what was done, in one line.
 
     Raises Diagnostic for a wrong text and for a macro that changed meanwhile. The macro is as it was then, and the

@@ -12,7 +12,7 @@ from typing import Any
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import toml_keys, toml_of
-from multidrop.macros.model import FIRST_PAGE, At, Macro, Step, check
+from multidrop.macros.model import FIRST_PAGE, At, Macro, MacroStep, check
 
 _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
 _SHORT = {"\\": "\\\\", '"': '\\"', "\t": "\\t", "\n": "\\n", "\r": "\\r", "\b": "\\b", "\f": "\\f"}
@@ -75,7 +75,7 @@ def parse_macro(text: str, where: str = "") -> Macro:
         raise Diagnostic("no name", where, 'add name = "..."')
     macro = Macro(
         table["name"],
-        tuple(_step(each, number, at) for number, each in enumerate(table.get("step", []), 1)),
+        tuple(_step(row, number, at) for number, row in enumerate(table.get("step", []), 1)),
         table.get("key", "").upper(),
         table.get("note", ""),
         str(table.get("page", FIRST_PAGE)),
@@ -88,7 +88,7 @@ def parse_macro(text: str, where: str = "") -> Macro:
     return macro
 
 
-def _step(table: Any, number: int, at: At) -> Step:
+def _step(table: Any, number: int, at: At) -> MacroStep:
     if not isinstance(table, dict):
         where = at("step", 0)
         raise Diagnostic(f"{_which(number)}must be a table", where, "write [[step]], then after = and line =")
@@ -96,13 +96,13 @@ def _step(table: Any, number: int, at: At) -> Step:
     if "line" not in table:
         raise Diagnostic(f"{_which(number)}no line", at("", number), 'add line = "..."')
     replies = _list(table, "replies", number, at)
-    return Step(float(table.get("after", 0.0)), table["line"], table.get("drive", ""), replies)
+    return MacroStep(float(table.get("after", 0.0)), table["line"], table.get("drive", ""), replies)
 
 
 def _list(table: Mapping[str, Any], key: str, number: int, at: At) -> tuple[str, ...]:
     """The texts of a key; none without it."""
     values = table.get(key, [])
-    if not all(isinstance(each, str) for each in values):
+    if not all(isinstance(value, str) for value in values):
         raise Diagnostic(f"{_which(number)}{key} must be {_TEXTS}", at(key, number))
     return tuple(values)
 
@@ -134,7 +134,7 @@ def _texts(values: Sequence[str]) -> str:
     """Format an array; one of several texts has a line for each."""
     if len(values) < 2:
         return f"[{''.join(map(quoted, values))}]"
-    return "".join(["[\n", *(f"    {quoted(each)},\n" for each in values), "]"])
+    return "".join(["[\n", *(f"    {quoted(value)},\n" for value in values), "]"])
 
 
 def quoted(text: str) -> str:

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import lines_of
 from multidrop.base.text import visible
-from multidrop.macros.model import KEYS, Macro, Step, escape, fill
+from multidrop.macros.model import KEYS, Macro, MacroStep, escape, fill
 
-MOST = 10_000
+MOST_LINES = 10_000
 """The largest number of lines that repetitions make of a string."""
-LONGEST = 86_400_000
+LONGEST_PAUSE_MS = 86_400_000
 """The longest pause, ms."""
 SLEEP = re.compile(r"/sleep\s+(?P<seconds>\d{1,5}(\.\d{0,3})?|\.\d{1,3})")
 PLAY = re.compile(r"/play\s+f(?P<number>[1-9]\d?)")
@@ -36,7 +36,7 @@ class _Steps:
     """The steps of one string so far."""
 
     where: str
-    done: list[Step] = field(default_factory=list)
+    done: list[MacroStep] = field(default_factory=list)
     text: str = ""
     pause: int = 0
     """The pause before the next line, ms."""
@@ -47,10 +47,10 @@ class _Steps:
         return Diagnostic(message, f"{self.where}:{column}", hint or "nothing was imported")
 
     def add(self, line: str) -> None:
-        self.done.append(Step(self.pause / 1000, line))
+        self.done.append(MacroStep(self.pause / 1000, line))
         self.pause = 0
-        if len(self.done) > MOST:
-            raise self.wrong(1, f"more than {MOST} lines")
+        if len(self.done) > MOST_LINES:
+            raise self.wrong(1, f"more than {MOST_LINES} lines")
 
     def take(self, match: re.Match[str], column: int) -> None:
         if (text := match["text"]) is not None:
@@ -81,7 +81,7 @@ class _Steps:
 
     def _wait(self, milliseconds: int, column: int) -> None:
         self.pause += milliseconds
-        if self.pause > LONGEST:
+        if self.pause > LONGEST_PAUSE_MS:
             raise self.wrong(column, "a pause of more than a day")
 
     def _word(self, word: str, digits: str, column: int) -> None:
@@ -94,14 +94,14 @@ class _Steps:
             self.add(f"/play f{number}")
         elif not self.done or not number:
             raise self.wrong(column, f"^r{number} repeats nothing")
-        elif len(self.done) * number > MOST:
-            raise self.wrong(column, f"^r{number} makes more than {MOST} lines")
+        elif len(self.done) * number > MOST_LINES:
+            raise self.wrong(column, f"^r{number} makes more than {MOST_LINES} lines")
         else:
             first, *rest = self.done
-            again = Step(first.after + self.pause / 1000, first.line)
+            again = MacroStep(first.after + self.pause / 1000, first.line)
             self.done += [again, *rest] * (number - 1)
 
-    def macro_steps(self, column: int) -> tuple[Step, ...]:
+    def macro_steps(self, column: int) -> tuple[MacroStep, ...]:
         """The steps once all is read; a pause at the end sleeps."""
         if self.text.strip():
             raise self.wrong(column, "the last line has no ^M", "without it the line would not be sent")
@@ -118,17 +118,17 @@ def imported(text: str, where: str, known: Iterable[str] = ()) -> list[Macro]:
 
     Raises Diagnostic with file, line and column for what has no counterpart.
     """
-    found: dict[str, Macro] = {}
+    macros: dict[str, Macro] = {}
     for number, row in enumerate(lines_of(text, where), 1):
         if row.strip() and not row.lstrip().startswith((";", "#")):
             macro = _macro(row, f"{where}:{number}")
-            if macro.name in found:
+            if macro.name in macros:
                 raise Diagnostic(f"F{macro.name[1:]} is defined twice", f"{where}:{number}", "nothing was imported")
-            found[macro.name] = macro
-    if not found:
+            macros[macro.name] = macro
+    if not macros:
         raise Diagnostic("no function keys", where, "valid: one key a line, F2 STRING")
-    _check_chains(found, where, set(known))
-    return list(found.values())
+    _check_chains(macros, where, set(known))
+    return list(macros.values())
 
 
 def _macro(row: str, where: str) -> Macro:
@@ -230,7 +230,7 @@ def _part(line: str, where: str) -> tuple[int, str]:
 
 def _milliseconds(seconds: float, where: str) -> int:
     milliseconds = round(seconds * 1000)
-    if abs(milliseconds - seconds * 1000) > 1e-6 or milliseconds > LONGEST:
+    if abs(milliseconds - seconds * 1000) > 1e-6 or milliseconds > LONGEST_PAUSE_MS:
         hint = "valid: whole milliseconds, up to a day"
         raise Diagnostic(f"a pause of {seconds:g} s has no counterpart", where, hint)
     return milliseconds

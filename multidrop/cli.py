@@ -151,8 +151,8 @@ class _Version(argparse.Action):
 
 def _has_others(given: Sequence[str], known: Sequence[Parameter]) -> bool:
     """Whether a line has an option that no feature of the wheel declares, or asks for help: others may add one."""
-    names = {"--no-config", *(name for each in known if each.option for name in each.names)}
-    return any(each.startswith("-") and each.partition("=")[0] not in names for each in given)
+    names = {"--no-config", *(name for parameter in known if parameter.option for name in parameter.names)}
+    return any(word.startswith("-") and word.partition("=")[0] not in names for word in given)
 
 
 def _load_others(given: Sequence[str]) -> None:
@@ -168,7 +168,7 @@ def _warn(warnings: Sequence[str]) -> None:
     if warnings:
         from multidrop.shell.streams.stdout import write
 
-        write(sys.stderr, *(f"warning: {each}" for each in warnings))
+        write(sys.stderr, *(f"warning: {warning}" for warning in warnings))
 
 
 def _the_one(name: str, commands: Mapping[str, Operation]) -> Mapping[str, Operation]:
@@ -236,16 +236,16 @@ def extras() -> dict[str, str]:
     """The extras of the distribution: the name of each, and a module that is there once it is installed."""
     from multidrop.base import registry
 
-    return EXTRAS | {extra: module for each in registry.wheels() for extra, module in each.extras.items()}
+    return EXTRAS | {extra: module for wheel in registry.wheels() for extra, module in wheel.extras.items()}
 
 
 def version() -> str:
     """Describe the installation, as in `multidrop 0.1.0, Python 3.11.7, extras: rerun`; import no module for it."""
     import multidrop
 
-    found = [extra for extra, module in sorted(extras().items()) if PathFinder.find_spec(module) is not None]
+    installed = [extra for extra, module in sorted(extras().items()) if PathFinder.find_spec(module) is not None]
     python = ".".join(map(str, sys.version_info[:3]))
-    return f"multidrop {multidrop.__version__}, Python {python}, extras: {', '.join(found) or 'none'}"
+    return f"multidrop {multidrop.__version__}, Python {python}, extras: {', '.join(installed) or 'none'}"
 
 
 def build(given: Sequence[str] = ()) -> Parser:
@@ -277,11 +277,11 @@ def _epilog(operation: Operation) -> str:
 
     own = COMMANDS.parts(operation.command)
     given = [*operation.examples, *examples(operation.command)] or [
-        each.examples[-1] for each in own.values() if each.examples
+        form.examples[-1] for form in own.values() if form.examples
     ]
-    lines = ["examples:", *(f"  multidrop {each}" for each in given)]
+    lines = ["examples:", *(f"  multidrop {form}" for form in given)]
     if own and operation.run:  # argparse does not list them
-        lines = ["also:", *(f"  {each.command:<15} {each.meaning}" for each in own.values()), "", *lines]
+        lines = ["also:", *(f"  {form.command:<15} {form.meaning}" for form in own.values()), "", *lines]
     if operation.own_urls:
         lines += ["", *textwrap.wrap(operation.own_urls, WIDTH, break_on_hyphens=False, break_long_words=False)]
     elif operation.takes_urls:

@@ -10,12 +10,12 @@ from __future__ import annotations
 import asyncio
 
 from multidrop.base.errors import DriveError, Stopped, TransportLost
-from multidrop.drives.drive import REST, Drive
+from multidrop.drives.drive import LEAST_REST, Drive
 
 ROUTINE = "its OE routine may have started"
-LIMIT = 1.0
+READING_TIMEOUT = 1.0
 """The longest time for these readings, s."""
-TRIES = 2
+READING_TRIES = 2
 RECENT = 1.0
 """The greatest age of a reading of a drive that moves, s."""
 LOST = (TimeoutError, DriveError, TransportLost)
@@ -24,7 +24,7 @@ LOST = (TimeoutError, DriveError, TransportLost)
 async def excused(drive: Drive) -> bool:
     """Read whether a drive that was at rest still is, runs no program and has no trips enabled: it needs no stop."""
     try:
-        async with asyncio.timeout(LIMIT):
+        async with asyncio.timeout(READING_TIMEOUT):
             ready = await drive.run(drive.family.values.parameters.ready())
             return not ready and not await drive.busy()
     except LOST:
@@ -42,14 +42,14 @@ async def active(drive: Drive) -> bool:
 async def _active_twice(drive: Drive) -> bool:
     if await active(drive):
         return True
-    await asyncio.sleep(REST)
+    await asyncio.sleep(LEAST_REST)
     return await active(drive)
 
 
 async def at_rest_after_error(drive: Drive) -> bool:
     """Read twice after an error whether a drive is at rest and runs no program; False also where that is not known."""
     try:
-        async with asyncio.timeout(LIMIT):
+        async with asyncio.timeout(READING_TIMEOUT):
             return not await _active_twice(drive)
     except LOST:
         return False
@@ -72,9 +72,9 @@ async def look_before(drive: Drive, text: str) -> None:
     """Read what a drive does before a line that it may refuse, where that is not known. Raises Stopped."""
     if drive.family.vouched(text, drive.product) or known_active(drive) is not None or drive.missing:
         return
-    for _ in range(TRIES):  # noise may have damaged a reply, and asking again changes nothing
+    for _ in range(READING_TRIES):  # noise may have damaged a reply, and asking again changes nothing
         try:
-            async with asyncio.timeout(LIMIT):
+            async with asyncio.timeout(READING_TIMEOUT):
                 await active(drive)
             return
         except Stopped:

@@ -24,13 +24,13 @@ from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.at_rest import excused
-from multidrop.shell.automation_record import Automation, Claim, Sent
+from multidrop.shell.automation_record import Automation, Claim, SentMotion
 from multidrop.shell.origin import Origin
 from multidrop.shell.workspace import Workspace
 
 LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""
-ENDING = 10.0
+END_TIMEOUT = 10.0
 """The longest wait of a front end for automations that end, with their `on_early_end` lines, s."""
 SOON = 0.5
 """The time after which a front end says that it waits for them, s."""
@@ -117,10 +117,12 @@ class Automations:
 
     def records(self, automation: Automation, drive: Drive, what: Started, why: str = "") -> None:
         before = automation.started.get(drive)
-        automation.started[drive] = Sent(drive.link.stamp(), before.what | what if before is not None else what, why)
+        automation.started[drive] = SentMotion(
+            drive.link.stamp(), before.what | what if before is not None else what, why
+        )
         automation.stopped.pop(drive, None)
 
-    def restores(self, automation: Automation, drive: Drive, before: Sent | None) -> None:
+    def restores(self, automation: Automation, drive: Drive, before: SentMotion | None) -> None:
         """Take the record of a line back: it has started nothing in the drive."""
         if before is None:
             automation.started.pop(drive, None)
@@ -160,11 +162,11 @@ class Automations:
             automation.still = before
 
     async def over(self, say: Callable[[str], None] = lambda text: None) -> None:
-        """Wait until every automation has ended; ENDING at most. `say` takes a line where that takes a while."""
+        """Wait until every automation has ended; END_TIMEOUT at most. `say` takes a line where that takes a while."""
         if not await self._over(SOON):
-            names = ", ".join(each.name or "a script" for each in self._running)
-            say(f"waiting {ENDING:g} s at most for the end of {names}")
-            await self._over(ENDING)
+            names = ", ".join(automation.name or "a script" for automation in self._running)
+            say(f"waiting {END_TIMEOUT:g} s at most for the end of {names}")
+            await self._over(END_TIMEOUT)
 
     async def _over(self, limit: float) -> bool:
         """Wait until no automation runs; whether that was within the limit."""
@@ -189,9 +191,9 @@ class Automations:
         self._stop(automation, excuses)
         try:
             if excuses and automation.stops == self._workspace.stops:
-                found = [*excuses]
-                at_rest = await asyncio.gather(*(excused(drive) for drive in found))
-                for drive, rests in zip(found, at_rest, strict=True):
+                drives = [*excuses]
+                at_rest = await asyncio.gather(*(excused(drive) for drive in drives))
+                for drive, rests in zip(drives, at_rest, strict=True):
                     if rests:
                         automation.started.pop(drive, None)
         finally:
@@ -234,7 +236,7 @@ class Automations:
         if exits:
             raise exits[0]
 
-    def _halt(self, link: Link, only: dict[Drive, Sent]) -> Halt:
+    def _halt(self, link: Link, only: dict[Drive, SentMotion]) -> Halt:
         started = {drive: sent.what for drive, sent in only.items()}
         bus = self._open_bus(link)
         if bus is None:
@@ -259,14 +261,14 @@ def _claiming(automation: Automation, name: str, claims: Collection[Claim]) -> I
         automation.name, automation.claims = before
 
 
-def _by_link(started: Mapping[Drive, Sent]) -> dict[Link, dict[Drive, Sent]]:
-    found: dict[Link, dict[Drive, Sent]] = {}
+def _by_link(started: Mapping[Drive, SentMotion]) -> dict[Link, dict[Drive, SentMotion]]:
+    by_link: dict[Link, dict[Drive, SentMotion]] = {}
     for drive, sent in started.items():
-        found.setdefault(drive.link, {})[drive] = sent
-    return found
+        by_link.setdefault(drive.link, {})[drive] = sent
+    return by_link
 
 
-def _rested(drive: Drive, sent: Sent) -> bool:
+def _rested(drive: Drive, sent: SentMotion) -> bool:
     """Whether a drive was read at rest after the last thing that was sent, and nothing of that moves it again."""
     seen, running = drive.seen, drive.running
     runs = running is not None and running.at > sent.at and running.runs
@@ -284,8 +286,8 @@ async def settled(workspace: Workspace) -> None:
     waits = [asyncio.create_task(bus.settled()) for bus in workspace.buses.values()]
     if waits:
         await asyncio.wait(waits, timeout=LINGER)
-        for each in waits:
-            each.cancel()
+        for wait in waits:
+            wait.cancel()
 
 
 def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
@@ -294,7 +296,9 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     lines = []
     if sent:
         tally = stop_report.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
-        named = [", ".join(workspace.display_name(each) + halt.part_of(each) for each in halt.drives) for halt in sent]
+        named = [
+            ", ".join(workspace.display_name(drive) + halt.part_of(drive) for drive in halt.drives) for halt in sent
+        ]
         names = ", ".join(name or halt.link.name for name, halt in zip(named, sent, strict=True))
         every = UNKNOWN if any(halt.reaches_unknown for halt in sent) else ""
         lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {names}{every}: {stop_report.words(tally)}")
@@ -302,7 +306,7 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
         lines.append(f"their line has only one stop, so these stopped too: {others}")
     programs = {drive: ran for halt in sent for drive, ran in halt.programs.items()}
     for ran, said in ((True, "program ended"), (None, "program ended, if one was running")):
-        if ended := _names(workspace, [drive for drive, each in programs.items() if each is ran]):
+        if ended := _names(workspace, [drive for drive, program in programs.items() if program is ran]):
             lines.append(f"{said}: {ended}")
     return lines + stop_report.unreached(halts, workspace.now())
 

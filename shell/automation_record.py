@@ -15,7 +15,7 @@ Claim = tuple[Link, str]
 
 
 @dataclass(frozen=True)
-class Sent:
+class SentMotion:
     """What an automation has sent to a drive that can have started it."""
 
     at: float
@@ -37,8 +37,8 @@ class Automation:
     """The drives that it will start."""
     still: str = ""
     """The reason why it may start nothing now; empty: it may."""
-    started: dict[Drive, Sent] = field(default_factory=dict)
-    stopped: dict[Drive, Sent] = field(default_factory=dict)
+    started: dict[Drive, SentMotion] = field(default_factory=dict)
+    stopped: dict[Drive, SentMotion] = field(default_factory=dict)
     """Those of `started` whose stops are written."""
     halts: list[Halt] = field(default_factory=list)
     """The stops of its drives, once they are written."""

@@ -48,8 +48,8 @@ def salvage(text: str, where: str, read: Callable[[dict[str, Any], str], T]) -> 
                 raise
             # The longest path of the document with which a message begins; that of the file itself is empty.
             name = problem.message.removeprefix("no key ")
-            found = [path for path in _paths(document) if re.match(rf"{re.escape('.'.join(path))}(?![\w-])", name)]
-            path = max(found, key=len, default=())
+            paths = [path for path in _paths(document) if re.match(rf"{re.escape('.'.join(path))}(?![\w-])", name)]
+            path = max(paths, key=len, default=())
             at = line_of(text, path)  # a name in quotation marks is not what its message begins with
             placed_at = f"{where}:{at}" if at and path else placed(problem.message, text, where).where
             problems.append(Diagnostic(problem.message, placed_at, problem.hint))
@@ -130,9 +130,9 @@ def line_of(text: str, key: Sequence[str]) -> int:
     """The number of the line with a key, given with its tables (`screen`, `theme`), or the nearest table's; 0: none."""
     best = depth = 0
     for way, number, _ in toml_keys(text):
-        found = [name for name, _ in way]
-        if found == list(key):
+        names = [name for name, _ in way]
+        if names == list(key):
             return number
-        if len(found) > depth and found == list(key[: len(found)]):
-            best, depth = number, len(found)
+        if len(names) > depth and names == list(key[: len(names)]):
+            best, depth = number, len(names)
     return best

@@ -136,7 +136,7 @@ Ask = Callable[[str], Awaitable[bool]]
 
 
 @dataclass(frozen=True)
-class Field:
+class AskedValue:
     """A value that a person is asked for. `default` None: an answer is needed."""
 
     name: str
@@ -156,7 +156,7 @@ class Field:
         return ""
 
 
-Fill = Callable[[str, Sequence[Field]], Awaitable[Mapping[str, str] | None]]
+Fill = Callable[[str, Sequence[AskedValue]], Awaitable[Mapping[str, str] | None]]
 """Puts a form to a person; returns the answers by name, None where the person gives up. A stop cancels it."""
 
 
@@ -249,7 +249,7 @@ class Questions:
         except Stopped:
             return False
 
-    async def fill_in(self, title: str, fields: Sequence[Field]) -> Mapping[str, str]:
+    async def fill_in(self, title: str, fields: Sequence[AskedValue]) -> Mapping[str, str]:
         """Ask a person for values. Raises Diagnostic without answers or a person, Stopped after a stop."""
         fill = self._channel.front.fill
         if fill is None:
@@ -295,7 +295,7 @@ class UnderWay:
         return f"{what}, {took:.0f} s" if what and took >= SILENCE else ""
 
 
-PERIOD = 0.1
+PROGRESS_PERIOD = 0.1
 """The shortest time between two reports of a job, s."""
 EARLIEST = 0.5
 """The time after which the pace of a job says how long it will take, s."""
@@ -317,7 +317,7 @@ class Job:
         now = self._channel.now()
         if total != self._total or done < self._first:
             self._began, self._first, self._total = now, done, total
-        if done < total and now - self._shown_at >= PERIOD:
+        if done < total and now - self._shown_at >= PROGRESS_PERIOD:
             self._shown_at = now
             self._channel.publish(Progressed(now, self._what, done, total, self._left(done, now)))
 

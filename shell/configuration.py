@@ -80,9 +80,9 @@ class Guarding:
 
     def what(self, family: Family, text: str) -> str:
         """The effect of a line that a drive executes, if a person must agree to it; empty: it needs no yes."""
-        found = family.guard(text)
-        if found is not None and found.name not in self.off:
-            return found.what
+        guard = family.guard(text)
+        if guard is not None and guard.name not in self.off:
+            return guard.what
         word = family.word_of(text) if self.also else ""
         return f"'{text.strip()}' is sent: [guards] also has {word}" if word in self.also else ""
 
@@ -97,7 +97,7 @@ class LogSettings:
 
 
 @dataclass(frozen=True)
-class Look:
+class ScreenSettings:
     """The settings of the screen. The screen itself checks the names of themes, functions and keys."""
 
     theme: str = ""
@@ -108,7 +108,7 @@ class Look:
     times: str = "clock"
 
 
-DEFAULT_LOOK = Look()
+DEFAULT_LOOK = ScreenSettings()
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Settings:
     state: Path = field(default_factory=lambda: state_folder())
     guards: Guarding = Guarding()
     log: LogSettings = LogSettings()
-    look: Look = DEFAULT_LOOK
+    look: ScreenSettings = DEFAULT_LOOK
     allowed: tuple[Path, ...] = ()
     """Further folders to which paths of cell files may lead, in `simulator.allow`."""
     sections: Mapping[str, Any] = field(default_factory=dict)
@@ -188,9 +188,9 @@ def parse(text: str, where: str, lenient: bool = False) -> Settings:
     try:
         return _read(toml_of(text, where), where)
     except Diagnostic:
-        found, problems, doubts = salvage(text, where, _read)
+        settings, problems, doubts = salvage(text, where, _read)
         if lenient:
-            return replace(found, problems=problems, in_doubt=doubts)
+            return replace(settings, problems=problems, in_doubt=doubts)
         raise WrongConfiguration(problems) from None
 
 
@@ -209,13 +209,13 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
     hint = "write [simulator] with allow = [...]"
     simulator = _table(document.get("simulator", {}), "simulator", ("allow",), where, hint)
     allowed = text_list(simulator, "simulator", "allow", where)
-    read = {name: _section(document[name], each, where) for name, each in sections().items() if name in document}
+    read = {name: _section(document[name], section, where) for name, section in sections().items() if name in document}
     return Settings(
         connections,
         guards=guards,
         log=log,
         look=look,
-        allowed=tuple(Path(where).parent / os.path.expanduser(each) for each in allowed),
+        allowed=tuple(Path(where).parent / os.path.expanduser(path) for path in allowed),
         sections=read,
         own_units=own,
     )
@@ -329,7 +329,7 @@ def _log(found: Any, where: str) -> LogSettings:
     return LogSettings(always, int(size * MEGABYTE), int(files))
 
 
-def _look(screen: Any, keys: Any, where: str) -> Look:
+def _look(screen: Any, keys: Any, where: str) -> ScreenSettings:
     table = _table(screen, "screen", (*CHOICES, "theme"), where, "write [screen]")
     if not isinstance(keys, dict):
         raise Diagnostic("keys is not a table", where, "write [keys]")
@@ -341,7 +341,7 @@ def _look(screen: Any, keys: Any, where: str) -> Look:
     for name, key in keys.items():
         if not isinstance(key, str):
             raise Diagnostic(f"keys.{name} is not text", where, 'write a key as in "^T" or "F9"')
-    return Look(**table, keys=keys, where=where)
+    return ScreenSettings(**table, keys=keys, where=where)
 
 
 # Changes

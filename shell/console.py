@@ -31,7 +31,7 @@ X, TAB = 0x58, 0x09
 STOP = "\x18"
 
 
-class Key(NamedTuple):
+class KeyRecord(NamedTuple):
     """The record of a key: its code, the UTF-16 unit that it gives (NUL: none), and the bits of the keys held."""
 
     pressed: bool
@@ -41,7 +41,7 @@ class Key(NamedTuple):
     repeats: int = 1
 
 
-def text_of(key: Key) -> str:
+def text_of(key: KeyRecord) -> str:
     """Return what a terminal sends for a key; empty for one that is released, or that gives nothing."""
     _, code, character, held, _ = key
     control, alt = bool(held & CONTROL), bool(held & ALT)
@@ -70,7 +70,7 @@ class KeyBytes:
     def __init__(self) -> None:
         self._decoder = getincrementaldecoder("utf-16-le")("replace")
 
-    def take(self, keys: Iterable[Key]) -> bytes:
+    def take(self, keys: Iterable[KeyRecord]) -> bytes:
         text = "".join(text_of(key) * max(1, key.repeats) for key in keys)
         return self._decoder.decode(text.encode("utf-16-le", "surrogatepass")).encode()
 
@@ -151,9 +151,9 @@ if sys.platform == "win32":
 
     def version() -> tuple[int, int, int]:
         """The version of Windows and its build. Python's own is that of a library, or what a manifest asks for."""
-        found = (wintypes.ULONG * 71)(284)  # OSVERSIONINFOEXW, which begins with its size
-        ctypes.WinDLL("ntdll").RtlGetVersion(found)
-        return found[1], found[2], found[3]
+        record = (wintypes.ULONG * 71)(284)  # OSVERSIONINFOEXW, which begins with its size
+        ctypes.WinDLL("ntdll").RtlGetVersion(record)
+        return record[1], record[2], record[3]
 
     def is_console(descriptor: int) -> bool:
         return _mode(descriptor) is not None
@@ -211,13 +211,14 @@ if sys.platform == "win32":
                     self._came(b"")
                     return
                 taken = records[: count.value]
-                pressed = (each.key for each in taken if each.kind == KEY)
+                pressed = (record.key for record in taken if record.kind == KEY)
                 data = keys.take(
-                    Key(bool(each.pressed), each.code, each.character, each.held, each.repeats) for each in pressed
+                    KeyRecord(bool(record.pressed), record.code, record.character, record.held, record.repeats)
+                    for record in pressed
                 )
                 if data:
                     self._came(data)
-                if any(each.kind == SIZE for each in taken):
+                if any(record.kind == SIZE for record in taken):
                     self._resized()
 
     def writer(descriptor: int, chunk: int) -> Callable[[bytes], int] | None:

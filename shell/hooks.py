@@ -61,13 +61,13 @@ class Options(NamedTuple):
         """What only one feature can add. Raises Diagnostic for a command that takes no options of features."""
         if self.command not in COMMANDS:
             raise Diagnostic(f"{self.command} takes no options of features; {' and '.join(COMMANDS)} do")
-        return tuple(f"{self.command} {name}" for each in self.parameters for name in each.names)
+        return tuple(f"{self.command} {name}" for parameter in self.parameters for name in parameter.names)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The options. Raises Diagnostic where they cannot be read."""
-        found = (replace(each, holder=(self.options.__name__, self.options)) for each in of_fields(self.options))
-        return guarded_as(self.prepare, found)
+        replaced = (replace(field, holder=(self.options.__name__, self.options)) for field in of_fields(self.options))
+        return guarded_as(self.prepare, replaced)
 
 
 class Added:
@@ -75,29 +75,29 @@ class Added:
 
     def __init__(self, command: str, chosen: argparse.Namespace) -> None:
         self._given: list[tuple[Options, Any]] = []
-        for each in options(command):
-            found = values(each.parameters, chosen)
-            self._given.append((each, each.options(**{one.name: found[one.name] for one in each.parameters})))
+        for option in options(command):
+            arguments = values(option.parameters, chosen)
+            self._given.append((option, option.options(**{one.name: arguments[one.name] for one in option.parameters})))
 
     def prepare(self, session: Session) -> None:
         """Do what the options ask for before a URL is opened."""
-        for each, given in self._given:
-            each.prepare(session, given)
+        for option, given in self._given:
+            option.prepare(session, given)
 
     async def opened(self, session: Session) -> None:
         """Do what the options ask for once all URLs are open. Raises what they raise."""
-        for each, given in self._given:
-            if each.opened is not None:
-                await each.opened(session, given)
+        for option, given in self._given:
+            if option.opened is not None:
+                await option.opened(session, given)
 
     def instead(self, more: bool) -> int | None:
         """Run what an option asks for in place of its command, and return the exit code; None: no option does.
 
         `more`: URLs or options of the command itself were given.
         """
-        for each, given in self._given:
-            besides = any(other != one.options() for one, other in self._given if one is not each)
-            if (code := each.instead(given, more or besides)) is not None:
+        for option, given in self._given:
+            besides = any(other != one.options() for one, other in self._given if one is not option)
+            if (code := option.instead(given, more or besides)) is not None:
                 return code
         return None
 
@@ -105,8 +105,8 @@ class Added:
     def around(self, app: App) -> Iterator[None]:
         """What the options ask for while a screen runs. Raises what they raise as they begin."""
         with ExitStack() as stack:
-            for each, given in self._given:
-                stack.enter_context(each.around(app, given))
+            for option, given in self._given:
+                stack.enter_context(option.around(app, given))
             yield
 
 
@@ -166,22 +166,22 @@ def switches() -> Iterator[Switch]:
 def options(command: str) -> Iterator[Options]:
     """The options that features add to a command; a feature of the wheel that adds none is not imported."""
     those = (*registry.with_words(f"{command} -"), *registry.by_others())
-    return (each for each in registry.records(those, Options) if each.command == command)
+    return (record for record in registry.records(those, Options) if record.command == command)
 
 
 def check(command: str, given: Sequence[str]) -> None:
     """Raise Diagnostic if an option is given of a feature of the wheel that is not there."""
-    for each in takewhile("--".__ne__, given):
-        if each.startswith("-"):
-            registry.with_word(f"{command} {each.partition('=')[0]}")
+    for word in takewhile("--".__ne__, given):
+        if word.startswith("-"):
+            registry.with_word(f"{command} {word.partition('=')[0]}")
 
 
 def added_to(command: str) -> tuple[Parameter, ...]:
     """The options that features add to a command."""
-    return tuple(one for each in options(command) for one in each.parameters)
+    return tuple(one for option in options(command) for one in option.parameters)
 
 
 def examples(command: str) -> list[str]:
     """The examples that features and families add to those of a command."""
-    found = [example for each in options(command) for example in each.examples]
-    return [*found, *(line for each in registry.added(Examples) if each.command == command for line in each.lines)]
+    every = [example for option in options(command) for example in option.examples]
+    return [*every, *(line for added in registry.added(Examples) if added.command == command for line in added.lines)]

@@ -15,10 +15,10 @@ from multidrop.shell.automation import AGREED, Automations, only_ends
 from multidrop.shell.events import FAILURES, By, Entered, Printed
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, join_target
 from multidrop.shell.origin import Origin
-from multidrop.shell.program_listing import Sight
+from multidrop.shell.program_listing import ListingSight
 from multidrop.shell.raw import RawLine, text_of
 from multidrop.shell.sending import sending
-from multidrop.shell.units import Units
+from multidrop.shell.units import SessionUnits
 from multidrop.shell.workspace import LATCHED, Workspace
 
 _MAYBE_QUANTITY = re.compile(r"[{}]|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
@@ -28,7 +28,7 @@ _MAYBE_QUANTITY = re.compile(r"[{}]|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
 class LinePath:
     """The way of one line of a session to a drive, or to a port in raw mode."""
 
-    def __init__(self, workspace: Workspace, automations: Automations, units: Units) -> None:
+    def __init__(self, workspace: Workspace, automations: Automations, units: SessionUnits) -> None:
         self._workspace, self._automations, self._units = workspace, automations, units
 
     async def text(self, parsed: DriveLine, origin: Origin) -> None:
@@ -147,7 +147,7 @@ class LinePassage:
         path: LinePath,
         workspace: Workspace,
         automations: Automations,
-        units: Units,
+        units: SessionUnits,
         bus: Bus,
         drive: Drive,
         parsed: DriveLine,
@@ -222,7 +222,7 @@ class LinePassage:
         workspace.addressed.add((self._bus.name, drive.address))
         workspace.lately.begin(self._origin)
         if _changes_program(drive, self._text):
-            Sight(workspace, drive).changes()
+            ListingSight(workspace, drive).changes()
         return recorded
 
     async def _send(self, starts: bool) -> Sequence[str]:

@@ -103,8 +103,8 @@ def each_names_one_drive(lines: Iterable[str]) -> bool:
     except Diagnostic:
         return False
     return all(
-        each.name in WAITS if isinstance(each, VerbLine) else each is None or each.address not in EVERYONE
-        for each in parsed
+        line.name in WAITS if isinstance(line, VerbLine) else line is None or line.address not in EVERYONE
+        for line in parsed
     )
 
 
@@ -114,12 +114,12 @@ def targets(lines: Iterable[str]) -> tuple[str, ...]:
     A line without a target goes to the first drive of a bus. The targets of others must not decide which one that is.
     """
     try:
-        parsed = [each for each in map(parse, lines) if isinstance(each, DriveLine)]
+        parsed = [line for line in map(parse, lines) if isinstance(line, DriveLine)]
     except Diagnostic:
         return ()
-    if any(each.address is None or each.address in EVERYONE for each in parsed):
+    if any(line.address is None or line.address in EVERYONE for line in parsed):
         return ()
-    return tuple(dict.fromkeys(f"{each.bus}:{each.address}" if each.bus else str(each.address) for each in parsed))
+    return tuple(dict.fromkeys(f"{line.bus}:{line.address}" if line.bus else str(line.address) for line in parsed))
 
 
 def divided(line: str) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from functools import partial
 from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, checked_values, is_role, missing
 from multidrop.macros.model import written
-from multidrop.shell.channel import Field
+from multidrop.shell.channel import AskedValue
 from multidrop.shell.workspace import Workspace
 
 
@@ -33,9 +33,9 @@ async def settled(
     for role in macro.roles:
         if role not in roles:
             take = partial(check_bus, workspace, macro, role)
-            fields.append(Field(role, f"an open bus: {' or '.join(buses)}", None, take, buses))
+            fields.append(AskedValue(role, f"an open bus: {' or '.join(buses)}", None, take, buses))
     if not fields or workspace.front.fill is not None:
-        examples = {each.name: each.example for each in missing(macro, values)}
+        examples = {parameter.name: parameter.example for parameter in missing(macro, values)}
         checked_values(macro, {**examples, **values})  # what is given is right
     if (fields or missing(macro, values)) and workspace.front.fill is not None:
         fields += value_fields(macro, values)
@@ -52,19 +52,19 @@ async def settled(
     return checked_values(macro, values), roles
 
 
-def value_fields(macro: Macro, given: Mapping[str, str]) -> list[Field]:
+def value_fields(macro: Macro, given: Mapping[str, str]) -> list[AskedValue]:
     """The values of a macro that are not given, as a form asks for them."""
     where = f"macro {macro.name}"
     return [
-        Field(
-            each.name,
-            each.valid,
-            None if each.default is None else written(each.default),
-            partial(each.take, where=where),
-            each.choices,
+        AskedValue(
+            parameter.name,
+            parameter.valid,
+            None if parameter.default is None else written(parameter.default),
+            partial(parameter.take, where=where),
+            parameter.choices,
         )
-        for each in macro.parameters
-        if each.name not in given
+        for parameter in macro.parameters
+        if parameter.name not in given
     ]
 
 

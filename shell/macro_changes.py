@@ -32,9 +32,9 @@ def editor() -> list[str]:
                 return shlex.split(command, posix=sys.platform != "win32")
             except ValueError:
                 raise Diagnostic(f"{name}: a quotation mark is not closed", hint="correct it") from None
-    for each in EDITORS:
-        if sys.stdin.isatty() and sys.stdout.isatty() and shutil.which(each):
-            return [each]
+    for editor in EDITORS:
+        if sys.stdin.isatty() and sys.stdout.isatty() and shutil.which(editor):
+            return [editor]
     raise Diagnostic("no editor is known", hint="set VISUAL or EDITOR to its command")
 
 
@@ -97,8 +97,8 @@ def set_key(store: MacroStore, key: str, name: str, page: str = FIRST_PAGE) -> t
     shown = key if page == FIRST_PAGE else f"{key} of page {page}"
     if name != OFF:
         store.load(name)
-    found, broken = store.on_key(key, page)
-    before = [macro.name for macro in found if macro.name != name]
+    changed, broken = store.on_key(key, page)
+    before = [macro.name for macro in changed if macro.name != name]
     if name == OFF and not before:
         raise broken[0] if broken else Diagnostic(f"nothing is on {shown}", "/key")
     for other in before:
@@ -107,7 +107,7 @@ def set_key(store: MacroStore, key: str, name: str, page: str = FIRST_PAGE) -> t
         store.set_key(name, key, page)
     off = f"; no longer on it: {', '.join(before)}" if before else ""
     plays = "nothing" if name == OFF else name
-    return f"{shown} plays {plays}{off}", [f"{each}: it may be on {shown} too" for each in broken]
+    return f"{shown} plays {plays}{off}", [f"{problem}: it may be on {shown} too" for problem in broken]
 
 
 def import_(store: MacroStore, file: str, force: bool = False) -> list[str]:
@@ -154,7 +154,7 @@ def export(store: MacroStore, file: str, names: Sequence[str], output: Callable[
     """
     new_file.check(file, printed=True)
     loaded = [store.load(name) for name in names or store.names()]
-    chosen = [each for each in loaded if names or each.key or is_key_name(each.name)]
+    chosen = [macro for macro in loaded if names or macro.key or is_key_name(macro.name)]
     if not chosen:
         raise Diagnostic("no macro is on a function key", file, "/key F3 MACRO puts one there, or name the macros")
     text = exported(chosen)

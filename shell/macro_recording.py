@@ -7,7 +7,7 @@ from dataclasses import replace
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import counted
 from multidrop.macros import Macro, parse_macro
-from multidrop.macros.recorder import Offer, with_waits
+from multidrop.macros.recorder import WaitOffer, with_waits
 from multidrop.shell.macro_arguments import roles_in
 from multidrop.shell.workspace import Workspace
 
@@ -16,9 +16,9 @@ async def keep(workspace: Workspace, waits: bool) -> None:
     """Save the recording, in another file if its own was changed meanwhile; then offer waits."""
     store = workspace.macros
     macro, before = workspace.recorder.macro(), workspace.recorder.before
-    wanted, found = macro.name, workspace.recorder.offers
+    wanted, recorded = macro.name, workspace.recorder.offers
     if waits:
-        macro = with_waits(macro, found)
+        macro = with_waits(macro, recorded)
     macro = replace(macro, roles=roles_in(macro, list(workspace.buses)))
     try:
         if store.contents(wanted) != before:
@@ -34,13 +34,13 @@ async def keep(workspace: Workspace, waits: bool) -> None:
         workspace.notify(f"{wanted} was changed meanwhile and stays unchanged", warning=True)
     workspace.notify(f"macro {macro.name}: {macro.length} in {path}")
     if waits:
-        for offer in found:
+        for offer in recorded:
             workspace.notify(f"macro {macro.name}: {offer.text}")
-    elif found:
-        await _offer(workspace, macro, found)
+    elif recorded:
+        await _offer(workspace, macro, recorded)
 
 
-async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
+async def _offer(workspace: Workspace, macro: Macro, found: list[WaitOffer]) -> None:
     """Ask whether waits go in place of the pauses; say how where no person can be asked, and after a no."""
     store, saved = workspace.macros, workspace.macros.contents(macro.name)
     changes = "; ".join(offer.text for offer in found)

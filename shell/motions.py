@@ -59,7 +59,7 @@ async def send(
     Raises MotionFailed where an error shows that a motion of the same automation has failed: before the line, which is
     then not sent, or after it. A person at the session is only told. A line that ends motion is never held back.
     """
-    line = _Line(workspace, origin, drive, (text,), check)
+    line = _MotionLine(workspace, origin, drive, (text,), check)
     return await line.run(lambda check: drive.send(text, check))
 
 
@@ -71,17 +71,19 @@ async def perform(workspace: Workspace, origin: Origin, drive: Drive, lines: Seq
             yield from check(drive)
         return (yield from work)
 
-    return await _Line(workspace, origin, drive, lines, None).run(lambda check: drive.run(checked(check), typed=True))
+    return await _MotionLine(workspace, origin, drive, lines, None).run(
+        lambda check: drive.run(checked(check), typed=True)
+    )
 
 
-class _Before:
+class _MotionsBefore:
     """The motions of a drive before a line."""
 
     def __init__(self, drive: Drive, courses: Courses, suspects: list[Course]) -> None:
         self.drive, self.courses, self.suspects, self.errors = drive, courses, suspects, drive.state.errors.count
 
 
-class _Line:
+class _MotionLine:
     """A line, the drives that it reaches, and what it does to their motions."""
 
     def __init__(
@@ -89,7 +91,7 @@ class _Line:
     ) -> None:
         motions = _motions(drive)
         self.by, self._unattended = origin.sequence(workspace), origin.automation is not None
-        self.effect = joined(() if drive.stores else [motions.effect(each) for each in lines])
+        self.effect = joined(() if drive.stores else [motions.effect(line) for line in lines])
         bus = workspace.buses.get(drive.link.name)
         to_all = bus is not None and drive.address in GLOBAL
         self.reached = bus.all_drives if bus is not None and to_all else [drive]
@@ -99,14 +101,14 @@ class _Line:
         """Execute it, with a check right before it, and record what it did."""
         check = self._check
         if self.effect.begins or not self.effect.stops:
-            for each in self.reached:
-                if self._may_have_failed(each):
-                    await each.run(self._judged_before(each))
+            for drive in self.reached:
+                if self._may_have_failed(drive):
+                    await drive.run(self._judged_before(drive))
         if self.effect.begins and self._to_all:
             await self._prepare_each()
         elif self.effect.begins:
             check = self._checked
-        before = [_Before(each, each.motions.copy(), self._suspect(each)) for each in self.reached]
+        before = [_MotionsBefore(drive, drive.motions.copy(), self._suspect(drive)) for drive in self.reached]
         try:
             result = await execute(check)
         except NOT_SENT as refusal:
@@ -127,25 +129,25 @@ class _Line:
 
     def _suspect(self, drive: Drive) -> list[Course]:
         """The motions of this sequence of which an error may be: not those that it has stopped itself."""
-        return [each for each in drive.motions.open_of(self.by) if not each.stopped]
+        return [course for course in drive.motions.open_of(self.by) if not course.stopped]
 
     def _may_have_failed(self, drive: Drive) -> bool:
         """Whether something is known already that shows, or may show, that a motion of this sequence has failed."""
         shown = bool(drive.state.error) or self.effect.clears
-        return any(each.restarted or shown for each in self._suspect(drive))
+        return any(course.restarted or shown for course in self._suspect(drive))
 
     def _took_effect(self) -> None:
-        for each in self.reached:
-            each.motions.effect(self.effect, self.by)
+        for drive in self.reached:
+            drive.motions.effect(self.effect, self.by)
 
     async def _prepare_each(self) -> None:
         """Read the signs of each drive that a line to all reaches: one that does not reply has none."""
-        for each in self.reached:
+        for drive in self.reached:
             signs = NO_SIGNS
-            if not (each.programming or each.link.away):
+            if not (drive.programming or drive.link.away):
                 with contextlib.suppress(Refused, NoAnswer, Inexpressible):
-                    signs = await each.run(self._signs(each))
-            self._record(each, signs)
+                    signs = await drive.run(self._signs(drive))
+            self._record(drive, signs)
 
     def _checked(self, drive: Drive) -> Procedure[None]:
         """Read the signs of the drive in the conversation of its line, right before that, and record its motion."""
@@ -176,7 +178,7 @@ class _Line:
             courses.append(Course(move, self.by, signs, state.errors.count, motions.runs(signs), drive.commands))
         drive.motions.begin(courses)
         if courses:
-            state.errors.motion(True, any(each.move.kind is MoveKind.PROGRAM for each in courses))
+            state.errors.motion(True, any(course.move.kind is MoveKind.PROGRAM for course in courses))
 
     def _judged_before(self, drive: Drive) -> Procedure[None]:
         """Judge the motions of this sequence whose error the next line would clear. Raises MotionFailed."""
@@ -185,12 +187,12 @@ class _Line:
             if failed is not None:
                 self._report(drive, failed, f"; '{self._text}' was not sent")
 
-    async def _judge_after(self, before: Sequence[_Before], fate: str) -> None:
+    async def _judge_after(self, before: Sequence[_MotionsBefore], fate: str) -> None:
         """Judge the motions of this sequence of which an error was read with the line. Raises MotionFailed."""
-        for each in before:
-            drive = each.drive
-            if any(map(_motions(drive).fails, drive.state.errors.since(each.errors))):
-                for course in each.suspects:
+        for drive_before in before:
+            drive = drive_before.drive
+            if any(map(_motions(drive).fails, drive.state.errors.since(drive_before.errors))):
+                for course in drive_before.suspects:
                     failed = await _sign_read(drive, course) if course.open else None
                     if failed is not None:
                         self._report(drive, failed, fate)
@@ -207,11 +209,11 @@ class _Line:
 
 def _sign_of(drive: Drive, course: Course) -> Procedure[Ending | None]:
     """Judge a motion that may be under way still: by a sign of failure only, not by where it is."""
-    if (found := course.cut_off) is None:
-        found = yield from _motions(drive).judge(course.move.axis, _evidence(drive, course))
-    if found is None or found.outcome in (Outcome.REACHED, Outcome.STOPPED):
+    if (ending := course.cut_off) is None:
+        ending = yield from _motions(drive).judge(course.move.axis, _evidence(drive, course))
+    if ending is None or ending.outcome in (Outcome.REACHED, Outcome.STOPPED):
         return None
-    return _judged(drive, course, found)
+    return _judged(drive, course, ending)
 
 
 async def _sign_read(drive: Drive, course: Course) -> Ending | None:
@@ -247,7 +249,7 @@ def _note_restart(workspace: Workspace, drive: Drive, ending: Ending) -> None:
 # Waits
 
 
-class Watch:
+class MotionWatch:
     """The motions whose end a wait waits for: those of its own sequence, else whatever moves each drive."""
 
     def __init__(self, workspace: Workspace, origin: Origin, drives: Sequence[Drive], ended: bool = False) -> None:
@@ -256,7 +258,7 @@ class Watch:
         self._by, self._accepts = origin.sequence(workspace), ended
         self._signs: dict[Drive, Signs] = {}
         self._errors: dict[Drive, int] = {}
-        self._restarts = {each: each.motions.restarts for each in drives}
+        self._restarts = {drive: drive.motions.restarts for drive in drives}
         self._silent: set[Drive] = set()
         self._missed: dict[Drive, int] = {}
         """How many readings in a row got no reply."""
@@ -278,11 +280,11 @@ class Watch:
 
     async def judge(self, drive: Drive) -> bool:
         """Judge the motions of a drive that is at rest; False: one is not over yet. Raises MotionFailed."""
-        found = await (self._judge_own(drive) if self.own(drive) else self._judge_other(drive))
-        if found is None:
+        endings = await (self._judge_own(drive) if self.own(drive) else self._judge_other(drive))
+        if endings is None:
             return False
-        self.endings.setdefault(drive, []).extend(found)
-        failed = [each for each in found if each.failed]
+        self.endings.setdefault(drive, []).extend(endings)
+        failed = [ending for ending in endings if ending.failed]
         if failed and not self._accepts:
             raise failure(self._workspace.display_name(drive), min(failed, key=_rank))
         return True
@@ -291,23 +293,23 @@ class Watch:
         endings = []
         for course in self.own(drive):
             motions, axis = _motions(drive), course.move.axis
-            found = course.cut_off
+            ending = course.cut_off
             try:
-                if found is None:
-                    found = await drive.run(motions.judge(axis, _evidence(drive, course)))
+                if ending is None:
+                    ending = await drive.run(motions.judge(axis, _evidence(drive, course)))
             except (Refused, NoAnswer) as error:
-                found = _unread(course, error)
-            if found is None:
+                ending = _unread(course, error)
+            if ending is None:
                 return None
-            endings.append(_judged(drive, course, found))
-            _note_restart(self._workspace, drive, found)
+            endings.append(_judged(drive, course, ending))
+            _note_restart(self._workspace, drive, ending)
         return endings
 
     async def _judge_other(self, drive: Drive) -> list[Ending] | None:
         if drive in self.endings or drive.programming:
             return []
         if self._accepts and (mine := drive.motions.of(self._by)):
-            return [each.ending for each in mine if each.ending is not None]
+            return [course.ending for course in mine if course.ending is not None]
         motions, state = _motions(drive), drive.state
         if drive.motions.restarts != self._restarts[drive]:
             return [restart("")]
@@ -317,17 +319,17 @@ class Watch:
         if type(motions) is Motions:
             return endings
         for axis in drive.family.units.axes():
-            found = await drive.run(motions.judge(axis, evidence))
-            if found is None:
+            ending = await drive.run(motions.judge(axis, evidence))
+            if ending is None:
                 return None
-            bad = found.outcome not in (Outcome.REACHED, Outcome.STOPPED, Outcome.REPLACED, Outcome.UNKNOWN)
-            endings.append(replace(found, failed=bad))
+            bad = ending.outcome not in (Outcome.REACHED, Outcome.STOPPED, Outcome.REPLACED, Outcome.UNKNOWN)
+            endings.append(replace(ending, failed=bad))
         return endings
 
     @property
     def left(self) -> list[Drive]:
         """The drives that can still be asked."""
-        return [each for each in self.drives if each not in self._silent]
+        return [drive for drive in self.drives if drive not in self._silent]
 
     def heard(self, drive: Drive) -> None:
         """Take a reply of a drive."""
@@ -351,8 +353,8 @@ class Watch:
     @property
     def worst(self) -> tuple[Drive, Ending] | None:
         """The ending to report of all."""
-        found = [(drive, each) for drive, endings in self.endings.items() for each in endings]
-        return min(found, key=lambda each: _rank(each[1])) if found else None
+        endings = [(drive, ending) for drive, endings in self.endings.items() for ending in endings]
+        return min(endings, key=lambda each: _rank(each[1])) if endings else None
 
 
 def _rank(ending: Ending) -> int:
@@ -368,4 +370,4 @@ async def check_own(workspace: Workspace, origin: Origin, drives: Iterable[Drive
     every = drives if drives is not None else [each for bus in workspace.buses.values() for each in bus.all_drives]
     for drive in every:
         if drive.motions.open_of(by) and not drive.programming and await still(drive):
-            await Watch(workspace, origin, [drive]).judge(drive)
+            await MotionWatch(workspace, origin, [drive]).judge(drive)

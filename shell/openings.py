@@ -17,7 +17,7 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.echoes import LocalEcho
 from multidrop.drives.stopping import Halt
-from multidrop.shell.connect.opening import Naming, Opened, Opener, first, open_buses
+from multidrop.shell.connect.opening import Naming, OpenedBus, Opener, first, open_buses
 from multidrop.shell.connect.reconnect import Newcomer
 from multidrop.shell.connect.scheme import Connection
 from multidrop.shell.connect.urls import parse, with_echo
@@ -39,7 +39,7 @@ def described(bus: Bus) -> str:
     alike: dict[str, list[str]] = {}
     for drive in bus.drives.values():
         alike.setdefault(model(drive), []).append(drive.label or drive.address)
-    drives = "; ".join(" ".join(filter(None, [*addresses, each])) for each, addresses in alike.items())
+    drives = "; ".join(" ".join(filter(None, [*addresses, form])) for form, addresses in alike.items())
     return f"{bus.name}: {drives or 'no drive has replied'}"
 
 
@@ -61,7 +61,7 @@ class Openings:
         """Open nothing yet. `lazy`: see `Hints`. `raw`: `open_all` looks for no drives. `tried`: see `Session`."""
         self._workspace = workspace
         self._lazy, self._raw = lazy, raw
-        self._tried = [split_target(each) for each in tried]
+        self._tried = [split_target(target) for target in tried]
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
@@ -181,7 +181,7 @@ class Openings:
         workspace, record, connection = self._workspace, self._workspace.of(bus), self._workspace.of(bus).connection
         assert connection is not None, bus.name
 
-        async def beside(where: Connection, naming: Naming) -> list[Opened]:
+        async def beside(where: Connection, naming: Naming) -> list[OpenedBus]:
             return await self._opener(where, lambda base: naming(f"{base}-search"))  # two buses never share a name
 
         searching = Scanning(workspace, beside, connection, lambda found: workspace.output(found.words()))
@@ -222,18 +222,18 @@ class Openings:
             with opening.listed(connection.name or connection.text), self._workspace.under_way(f"opening {shown}"):
                 async with in_turn:
                     try:
-                        found = await self._opener(connection, opening.named)
+                        opened = await self._opener(connection, opening.named)
                     except TransportLost as failure:
                         if not keep or connection.scheme.simulated:
                             raise
-                        found = await open_buses(connection, opening.named, self._workspace.settings.state, failure)
+                        opened = await open_buses(connection, opening.named, self._workspace.settings.state, failure)
             addresses = {label: address for address, label in connection.labels.items()}
             hinted = []
-            for each in found:  # an address without a bus belongs to the first URL; a label counts as its address
-                own = [to for name, to in self._tried if name == each.bus.name or (not name and opening.place == 1)]
+            for open_bus in opened:  # an address without a bus belongs to the first URL; a label counts as its address
+                own = [to for name, to in self._tried if name == open_bus.bus.name or (not name and opening.place == 1)]
                 tried = tuple(dict.fromkeys(addresses.get(to, to) for to in own if to and to not in EVERYONE))
-                hints = replace(each.hints, lazy=self._lazy and not raw, tried=tried)
-                hinted.append(replace(each, hints=hints))
+                hints = replace(open_bus.hints, lazy=self._lazy and not raw, tried=tried)
+                hinted.append(replace(open_bus, hints=hints))
             return await opening.identify(hinted, connection, raw, self._tabbed)
         finally:
             self._reserved -= opening.names
@@ -299,7 +299,7 @@ class _Opening:
             self._workspace.opening.remove(entry)
 
     async def identify(
-        self, found: Sequence[Opened], connection: Connection, raw: bool, keep: bool = False
+        self, found: Sequence[OpenedBus], connection: Connection, raw: bool, keep: bool = False
     ) -> list[Bus]:
         """Adopt the buses and find their drives, but not where they are to be `raw`; a failure closes them all.
 
@@ -307,48 +307,50 @@ class _Opening:
         """
         workspace, newcomers = self._workspace, _Newcomers(self._workspace)
         async with contextlib.AsyncExitStack() as failing:
-            for each in found:
-                failing.push_async_callback(workspace.forget, each.bus)
-            for each in found:
-                in_cell = self.bases.get(each.bus.name, each.bus.name)
-                if each.absent:
-                    newcomers.add(each, connection)
-                record = workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
+            for opened in found:
+                failing.push_async_callback(workspace.forget, opened.bus)
+            for opened in found:
+                in_cell = self.bases.get(opened.bus.name, opened.bus.name)
+                if opened.absent:
+                    newcomers.add(opened, connection)
+                record = workspace.adopt(
+                    replace(opened, warnings=()) if raw else opened, self.place, connection, in_cell
+                )
                 if not connection.scheme.simulated:
                     doubts = workspace.settings.in_doubt
                     record.doubt = doubts.get(connection.name, "") or doubts.get("", "")
-                if each.limits:
-                    workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
-                each.bus.link.on_echo = partial(_echo_found, workspace, each.bus)
+                if opened.limits:
+                    workspace.notify(f"{opened.bus.name}: {opened.limits}", bus=opened.bus.name, warning=True)
+                opened.bus.link.on_echo = partial(_echo_found, workspace, opened.bus)
             late: list[tuple[Bus, Halt]] = []
-            for bus in [each.bus for each in found] if self._stops != workspace.stops else ():
+            for bus in [opened.bus for opened in found] if self._stops != workspace.stops else ():
                 late.append((bus, bus.halt()))  # the stop that came meanwhile, before anything else
                 bus.halted(late[-1][1])
                 text = f"{bus.name}: the stop that came while it was being opened was sent first"
                 workspace.notify(text, bus=bus.name)
-            for each in found:
-                port = workspace.of(each.bus).port = connection.port_name
-                if each.absent:
+            for opened in found:
+                port = workspace.of(opened.bus).port = connection.port_name
+                if opened.absent:
                     continue
                 try:
-                    await self._find(each, connection, raw)
+                    await self._find(opened, connection, raw)
                 except NoAnswer as failure:
                     if not keep:
                         raise
-                    newcomers.add(each, connection)
-                    if newcomers.silent(each, connection, failure):
-                        workspace.reconnections.lost(each.bus)
+                    newcomers.add(opened, connection)
+                    if newcomers.silent(opened, connection, failure):
+                        workspace.reconnections.lost(opened.bus)
                     continue
-                workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
+                workspace.reconnections.add(opened.bus, opened.hints, opened.reopen, port)
             for bus, halt in late:  # again by name, as some drives need it, and confirmed; but none started since
                 if bus.roster.strange:
                     continue
                 standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
                 bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))
             failing.pop_all()
-        return [each.bus for each in found]
+        return [opened.bus for opened in found]
 
-    async def _find(self, opened: Opened, connection: Connection, raw: bool) -> None:
+    async def _find(self, opened: OpenedBus, connection: Connection, raw: bool) -> None:
         """Find the drives of a bus, or show its bytes."""
         workspace, bus = self._workspace, opened.bus
         if raw:
@@ -368,13 +370,13 @@ class _Newcomers:
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
 
-    def add(self, opened: Opened, connection: Connection) -> None:
+    def add(self, opened: OpenedBus, connection: Connection) -> None:
         """Try a bus again whenever it is lost, and find its drives then for the first time."""
         newcomer = Newcomer(partial(self.found, opened, connection), partial(self.silent, opened, connection))
         port = connection.port_name
         self._workspace.reconnections.add(opened.bus, opened.hints, opened.reopen, port, newcomer)
 
-    async def found(self, opened: Opened, connection: Connection) -> None:
+    async def found(self, opened: OpenedBus, connection: Connection) -> None:
         """Say what was found, and name it."""
         workspace, bus = self._workspace, opened.bus
         label(bus, connection)
@@ -383,12 +385,12 @@ class _Newcomers:
         known = workspace.of(bus).connection
         if known is not None and known.local_echo and not connection.local_echo:
             _say_echo(workspace, bus)
-        for each in workspace.on_opened if workspace.scaled and not opened.hints.lazy else ():
-            await each(bus)
+        for callback in workspace.on_opened if workspace.scaled and not opened.hints.lazy else ():
+            await callback(bus)
         for text in crash_marks.left(workspace.settings.state, workspace.of(bus).port):
             workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
 
-    def silent(self, opened: Opened, connection: Connection, failure: DriveError) -> bool:
+    def silent(self, opened: OpenedBus, connection: Connection, failure: DriveError) -> bool:
         """Say once that no drive replies, what came, and the ways on; return whether the line is asked again by itself.
 
         It is where drives are known to reply as they are asked, or where no baud rate can be wrong. To other drives
@@ -442,9 +444,9 @@ def _say_echo(workspace: Workspace, bus: Bus) -> None:
 
 def label(bus: Bus, connection: Connection) -> None:
     """Give the drives of a bus the names that a saved connection has for them."""
-    labels, found = connection.labels, list(bus.drives.values())
-    for drive in found:
-        sole = next(iter(labels.values()), "") if len(found) == len(labels) == 1 else ""
+    labels, drives = connection.labels, list(bus.drives.values())
+    for drive in drives:
+        sole = next(iter(labels.values()), "") if len(drives) == len(labels) == 1 else ""
         drive.label = labels.get(drive.address, sole)
 
 

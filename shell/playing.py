@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, field
 
-from multidrop.shell.channel import PERIOD, Channel
+from multidrop.shell.channel import PROGRESS_PERIOD, Channel
 from multidrop.shell.events import Progressed
 
 FOREVER = "forever"
@@ -66,7 +66,7 @@ class StepProgress:
     def begins(self, step: int, line: str) -> None:
         self._playing.step = step
         self._text = f"{self._playing.name}, {self._playing.at}: {line}"
-        late = self._shown_at + PERIOD - self._channel.now()
+        late = self._shown_at + PROGRESS_PERIOD - self._channel.now()
         if late <= 0:
             self.show()
         elif self._timer is None:

@@ -49,4 +49,4 @@ def needed(word: str = "") -> PlotTargets:
 
 def _words() -> list[str]:
     """The words of the registry that are options of `/plot`."""
-    return [each for each in registry.words() if each.startswith(f"{_PLOT}-")]
+    return [word for word in registry.words() if word.startswith(f"{_PLOT}-")]

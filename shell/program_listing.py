@@ -25,7 +25,7 @@ AROUND = 3
 _LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
 
 
-class Listing:
+class ProgramListing:
     """The lines of the program in a drive. `state`: the folder with the copies of downloaded files."""
 
     def __init__(self, state: Path, programs: Programs, rows: Sequence[Stored] = ()) -> None:
@@ -33,11 +33,11 @@ class Listing:
         held = Held(self.rows)
         source = Sources(state).find(held) if rows else None
         lines = () if source is None else programs.annotated(source.text, held)
-        self._remarks = {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
+        self._remarks = {int(match[1]): match[2] for line in lines if (match := _LISTED.fullmatch(line))}
 
     def row(self, address: int) -> Stored:
         """The line at an address, or the one whose compiled lines hold that address."""
-        return next((each for each in reversed(self.rows) if each.at <= address), Stored(address, ""))
+        return next((listed for listed in reversed(self.rows) if listed.at <= address), Stored(address, ""))
 
     @property
     def lines(self) -> tuple[tuple[int, str], ...]:
@@ -63,7 +63,7 @@ class Listing:
         return self._remarks.get(row.at, row.text) if row in self.rows else row.text
 
 
-class Sight:
+class ListingSight:
     """Publishes what is seen of the program of a drive."""
 
     def __init__(self, channel: Channel, drive: Drive) -> None:
@@ -71,7 +71,7 @@ class Sight:
         self._last: tuple[int | None, Phase] = (None, Phase.EXECUTES)
         self._break_point = ""
 
-    def read(self, listing: Listing) -> None:
+    def read(self, listing: ProgramListing) -> None:
         self._channel.publish(ProgramRead(*self._place(), listing.lines))
 
     def changes(self) -> None:
@@ -100,7 +100,7 @@ def say_none(workspace: Workspace, drive: Drive) -> None:
 def forget(workspace: Workspace, drive: Drive) -> None:
     """Take nothing of what was read of a drive that was restarted, or may have been, for what it holds."""
     workspace.names.forget(drive)
-    sight = Sight(workspace, drive)
+    sight = ListingSight(workspace, drive)
     sight.changes()
     sight.breaks("")
     at, bus, address = workspace.now(), drive.link.name, drive.address
@@ -162,8 +162,8 @@ async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[So
         held = await transferring(drive, drive.programs.read(lines, job))
     workspace.names.learn(drive, held)
     if drive.family.debugging is not None and not held.locked:
-        listing = Listing(workspace.settings.state, drive.programs, drive.family.debugging.rows(held))
-        Sight(workspace, drive).read(listing)
+        listing = ProgramListing(workspace.settings.state, drive.programs, drive.family.debugging.rows(held))
+        ListingSight(workspace, drive).read(listing)
     return held
 
 

@@ -21,7 +21,7 @@ GOES_ON = "multidrop goes on"
 """The outcome of a quit that was declined."""
 ENDING = "multidrop is ending"
 """Why a line is not sent after an accepted quit."""
-NAMED = 10
+MOST_NAMED_LINES = 10
 """The number of unsent lines that are named one by one."""
 
 
@@ -67,7 +67,7 @@ def say_unsent(channel: Channel, lines: Iterable[str]) -> None:
 def not_sent(lines: Sequence[str], why: str = ENDING) -> list[str]:
     """Name lines that were typed and are not sent, in lines for a person."""
     typed = [line.strip() for line in lines if line.strip()]
-    named = [f"not sent, as {why}: {visible(line)}" for line in typed[:NAMED]]
-    if len(typed) > NAMED:
-        named.append(f"{counted(len(typed) - NAMED, 'more line was', 'more lines were')} not sent")
+    named = [f"not sent, as {why}: {visible(line)}" for line in typed[:MOST_NAMED_LINES]]
+    if len(typed) > MOST_NAMED_LINES:
+        named.append(f"{counted(len(typed) - MOST_NAMED_LINES, 'more line was', 'more lines were')} not sent")
     return named

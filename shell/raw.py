@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from multidrop.drives.events import BusEvent
     from multidrop.transports import PortControl
 
-GAP = 0.05
+ROW_PAUSE = 0.05
 """The quiet time after which a piece without an end is shown, s."""
 TERMINATORS = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n", "none": b""}
 """What follows a typed text, by its name."""
@@ -39,7 +39,7 @@ _END = re.compile(rb"\r\n|\n|\r(?=[^\n])", re.DOTALL)
 _ITEM = re.compile(r'"([^"]*)"|(\S+)')
 
 
-class Form(Enum):
+class ByteForm(Enum):
     """How bytes are shown; the most of them in a row, and the most cells of their text."""
 
     TEXT = ("text", 64, 256)
@@ -50,20 +50,20 @@ class Form(Enum):
     def rows(self, data: bytes) -> Iterator[str]:
         _, most, cells = self.value
         for piece in parts_of(data, most, cells) if data else ():
-            if self is Form.BOTH:
+            if self is ByteForm.BOTH:
                 yield f"{text_of(piece):<{cells}} {hex_of(piece)}"
             else:
-                yield text_of(piece) if self is Form.TEXT else hex_of(piece)
+                yield text_of(piece) if self is ByteForm.TEXT else hex_of(piece)
 
 
 def parts_of(data: bytes, most: int, cells: int) -> Iterator[bytes]:
     """Divide bytes into rows of at most `most` bytes, and of at most `cells` of text."""
     part = b""
-    for each in data:
-        longer = part + bytes([each])
+    for byte in data:
+        longer = part + bytes([byte])
         if part and (len(longer) > most or len(text_of(longer)) > cells):
             yield part
-            longer = bytes([each])
+            longer = bytes([byte])
         part = longer
     yield part
 
@@ -85,7 +85,7 @@ class ByteView:
 
     def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
         self.bus = bus
-        self.form = Form.BOTH
+        self.form = ByteForm.BOTH
         self.last = bus.now()
         """The time of the last byte, sent or received, s."""
         self._publish, self._wall = publish, wall
@@ -115,7 +115,7 @@ class ByteView:
             self._piece_at = event.at
         self._piece += event.data
         # Show whole lines, and set the time at which the rest is shown.
-        ends = [found.end() for found in _END.finditer(self._piece)]
+        ends = [match.end() for match in _END.finditer(self._piece)]
         lines = [self._piece[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
         if lines:
             self._show(self._piece_at, False, lines)
@@ -126,7 +126,7 @@ class ByteView:
         if len(self._piece) >= self.form.value[1]:
             self._flush()
         elif self._piece:
-            self._timer = asyncio.get_running_loop().call_later(GAP, self._flush)
+            self._timer = asyncio.get_running_loop().call_later(ROW_PAUSE, self._flush)
 
     def _flush(self) -> None:
         piece, self._piece = self._piece, b""
@@ -213,7 +213,7 @@ class RawLine(ByteView):
 
 def parse_bytes(items: str) -> bytes:
     """Parse bytes: `0D 0A`, `1b5B`, a control byte by name or as `^C`, a text in quotation marks. Raises Diagnostic."""
-    return b"".join(_item(found[1], found[2]) for found in _ITEM.finditer(items))
+    return b"".join(_item(match[1], match[2]) for match in _ITEM.finditer(items))
 
 
 def _item(quoted: str | None, word: str | None) -> bytes:

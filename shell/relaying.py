@@ -34,10 +34,10 @@ def lender(port: str) -> Lent | None:
     named = _NAMED.match(port)
     if named is None:
         return None
-    return next((each for each in registry.answering(Lent, f"relay {named[1]}") if each.name == named[1]), None)
+    return next((lent for lent in registry.answering(Lent, f"relay {named[1]}") if lent.name == named[1]), None)
 
 
 def ports() -> str:
     """What PORT may be, for its help."""
-    added = (f"; {each.name} is {each.meaning}" for each in registry.added(Lent))
+    added = (f"; {lent.name} is {lent.meaning}" for lent in registry.added(Lent))
     return f"a serial port of this machine{''.join(added)}"

@@ -65,7 +65,7 @@ class KnownNames:
             self.learn(drive, await drive.run(at_priority(programs.names(), Priority.POLL)))
 
 
-KEPT = 1000
+MOST_REMEMBERED_LINES = 1000
 """The number of lines kept."""
 
 
@@ -73,7 +73,7 @@ class Lately:
     """The last lines that drives printed, replies and others, each with its number."""
 
     def __init__(self) -> None:
-        self._lines: deque[tuple[int, str]] = deque(maxlen=KEPT)
+        self._lines: deque[tuple[int, str]] = deque(maxlen=MOST_REMEMBERED_LINES)
         self._count = 0
         self._typed = 0
         """The number of lines before the last line that was sent to a drive."""
@@ -126,29 +126,29 @@ class Observing:
     def take(self, event: SessionEvent) -> None:
         if not isinstance(event, OnBus):
             return
-        found, observed = event.event, self._recorder.observed
-        if isinstance(found, Conditioned):
+        happened, observed = event.event, self._recorder.observed
+        if isinstance(happened, Conditioned):
             # Note each input that has changed and that can be asked for.
-            for conditions in found.conditions:
+            for conditions in happened.conditions:
                 for lamp in conditions.lamps:
-                    key = (event.bus, found.address, f"I{lamp.name}")
+                    key = (event.bus, happened.address, f"I{lamp.name}")
                     if lamp.output or lamp.on is None:
                         continue
                     before, self._inputs[key] = self._inputs.get(key), lamp.on
                     if self._recorder.name and before not in (None, lamp.on) and self._has(*key):
-                        target = join_target(event.bus if len(self._buses()) > 1 else "", found.address)
+                        target = join_target(event.bus if len(self._buses()) > 1 else "", happened.address)
                         condition = f"{key[2]}={int(lamp.on)}"
                         text = f"@{target} {condition}" if target else condition
-                        self._recorder.observed.inputs.append((found.at, text))
+                        self._recorder.observed.inputs.append((happened.at, text))
         elif not self._recorder.name:
             return
-        elif isinstance(found, Unsolicited):
-            observed.texts.extend((found.at, line) for line in found.lines)
-        elif isinstance(found, Sample):
-            observed.moving.append((found.at, found.velocity != 0))
+        elif isinstance(happened, Unsolicited):
+            observed.texts.extend((happened.at, line) for line in happened.lines)
+        elif isinstance(happened, Sample):
+            observed.moving.append((happened.at, happened.velocity != 0))
 
     def _has(self, bus: str, address: str, word: str) -> bool:
         """True if a drive can be asked for a word."""
-        found = self._buses().get(bus)
-        drive = found.drives.get(address) if found is not None else None
+        open_bus = self._buses().get(bus)
+        drive = open_bus.drives.get(address) if open_bus is not None else None
         return drive is not None and drive.family.question(word) is not None

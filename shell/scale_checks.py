@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.shell.workspace import Workspace
 
-AGAIN = 2.0
+LOOK_PERIOD = 2.0
 """Seconds between two attempts to read what a scale rests on that may not hold, while its drive is polled."""
 
 
@@ -39,11 +39,11 @@ class ScaleChecks:
         """
         bus = self.workspace.buses.get(drive.link.name)
         meant = bus.all_drives if bus is not None and drive.address in EVERYONE else [drive]
-        for each in meant if not drive.programming else ():
-            named = not text or any(re.search(rf"\b{name}\b", text, re.I) for name in each.counting.names)
-            if each.counting.axes and (named or not each.counting.read_since(each.state.recounts)):
+        for other in meant if not drive.programming else ():
+            named = not text or any(re.search(rf"\b{name}\b", text, re.I) for name in other.counting.names)
+            if other.counting.axes and (named or not other.counting.read_since(other.state.recounts)):
                 with suppress(DriveError, TransportLost):
-                    await recount(each)
+                    await recount(other)
                 self.workspace.changed()
 
     def _settings_read(self, event: SessionEvent) -> None:
@@ -64,7 +64,7 @@ class ScaleChecks:
         if drive is None or drive.counting.read_since(drive.state.recounts) or drive.programming:
             return
         looked = self._looks.get(drive)
-        if looked is None or (looked[1].done() and event.event.at - looked[0] >= AGAIN):
+        if looked is None or (looked[1].done() and event.event.at - looked[0] >= LOOK_PERIOD):
             self._looks[drive] = event.event.at, asyncio.get_running_loop().create_task(self._recount(drive))
 
     async def _recount(self, drive: Drive) -> None:

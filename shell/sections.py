@@ -33,7 +33,7 @@ class Section(NamedTuple):
 
 def sections() -> dict[str, Section]:
     """The tables of the features that are there, by name."""
-    return {each.name: each for each in registry.added(Section) if each.name not in CORE}
+    return {section.name: section for section in registry.added(Section) if section.name not in CORE}
 
 
 def valid() -> tuple[str, ...]:
@@ -44,7 +44,7 @@ def valid() -> tuple[str, ...]:
 
 def text_list(table: Mapping[str, Any], name: str, key: str, where: str) -> tuple[str, ...]:
     """A list of texts in a table. Raises Diagnostic."""
-    found = table.get(key, [])
-    if not isinstance(found, list) or not all(isinstance(each, str) and each for each in found):
+    texts = table.get(key, [])
+    if not isinstance(texts, list) or not all(isinstance(text, str) and text for text in texts):
         raise Diagnostic(f"{name}.{key} is not a list of texts", where, f'as in {key} = ["..."]')
-    return tuple(found)
+    return tuple(texts)

@@ -16,16 +16,16 @@ from multidrop.drives.drive import Drive
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.shell import at_rest
 from multidrop.shell.automation import Automations
-from multidrop.shell.automation_record import Automation, Sent
+from multidrop.shell.automation_record import Automation, SentMotion
 from multidrop.shell.events import FAILURES
 from multidrop.shell.origin import Origin
 
 
 @dataclass(frozen=True)
-class _Before:
+class _DriveBefore:
     """What was known of a drive before a line."""
 
-    sent: Sent | None
+    sent: SentMotion | None
     requests: int
     commands: int
     commanded_at: float
@@ -54,9 +54,9 @@ async def sending(
         await at_rest.look_before(drive, text)
     what = drive.codec.started(text) if text else Started()
     stored, at = drive.stores, drive.link.stamp()
-    before = {each: _before(automation, each) for each in drive.recipients}
-    for each in before if starts else ():
-        automations.starts(origin, each, what, only_ends=only_ends)
+    before = {recipient: _before(automation, recipient) for recipient in drive.recipients}
+    for other in before if starts else ():
+        automations.starts(origin, other, what, only_ends=only_ends)
     try:
         yield
     except FAILURES as failure:
@@ -65,19 +65,19 @@ async def sending(
         if stored and not drive.stores and drive.starts(text):  # it was executed, as program mode had ended
             automations.records(automation, drive, what)
             raise
-        for each, was in before.items():
-            each_as_it_was = each is drive or each.commanded_at == was.commanded_at
-            if each_as_it_was and _started_nothing(each, was, failure, parts):
-                automations.restores(automation, each, was.sent)
-            sure = each in automation.started or was.active or stored
-            if not sure and _has_error(each, was, text, failure, at):
-                await _after_error(automations, automation, each)
+        for other, was in before.items():
+            each_as_it_was = other is drive or other.commanded_at == was.commanded_at
+            if each_as_it_was and _started_nothing(other, was, failure, parts):
+                automations.restores(automation, other, was.sent)
+            sure = other in automation.started or was.active or stored
+            if not sure and _has_error(other, was, text, failure, at):
+                await _after_error(automations, automation, other)
         raise
 
 
-def _before(automation: Automation | None, drive: Drive) -> _Before:
+def _before(automation: Automation | None, drive: Drive) -> _DriveBefore:
     sent = automation.started.get(drive) if automation is not None else None
-    return _Before(sent, drive.requests, _commands(drive), drive.commanded_at, bool(at_rest.known_active(drive)))
+    return _DriveBefore(sent, drive.requests, _commands(drive), drive.commanded_at, bool(at_rest.known_active(drive)))
 
 
 def _commands(drive: Drive) -> int:
@@ -89,7 +89,7 @@ def _has_routine(drive: Drive) -> bool:
     return drive.codec.error_routine and drive.address not in GLOBAL and not (drive.stores or drive.state.stranger)
 
 
-def _started_nothing(drive: Drive, before: _Before, failure: BaseException, parts: bool) -> bool:
+def _started_nothing(drive: Drive, before: _DriveBefore, failure: BaseException, parts: bool) -> bool:
     """Whether a line that failed has started nothing by itself in a drive."""
     if isinstance(failure, TransportLost) and (failure.unproven or failure.executed):
         return False
@@ -100,7 +100,7 @@ def _started_nothing(drive: Drive, before: _Before, failure: BaseException, part
     return isinstance(failure, (Refused, Inexpressible, Differs))
 
 
-def _has_error(drive: Drive, before: _Before, text: str, failure: BaseException, at: float) -> bool:
+def _has_error(drive: Drive, before: _DriveBefore, text: str, failure: BaseException, at: float) -> bool:
     """Whether a drive has an error, or may have one, that may have started its routine for errors.
 
     A reply that is damaged or lost may be the refusal of a line for which the tables do not vouch.

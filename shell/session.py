@@ -25,7 +25,7 @@ from multidrop.drives.drive import Drive
 from multidrop.drives.events import Restarted
 from multidrop.shell import program_listing
 from multidrop.shell.at_session import AtSession
-from multidrop.shell.automation import ENDING, Automations
+from multidrop.shell.automation import END_TIMEOUT, Automations
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
 from multidrop.shell.events import FAILURES, By, Entered, Failed, OnBus, SessionEvent
@@ -38,7 +38,7 @@ from multidrop.shell.operations.verb import Chosen, Verb
 from multidrop.shell.origin import PERSON, Origin
 from multidrop.shell.quitting import ENDING as QUITTING
 from multidrop.shell.quitting import EVEN_NOW, Unanswered
-from multidrop.shell.units import Units
+from multidrop.shell.units import SessionUnits
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import Workspace
 
@@ -84,7 +84,7 @@ class Session(Workspace):
         super().__init__(settings or Settings(), reconnect)
         self.automations = Automations(self)
         self.unanswered = Unanswered()
-        self.units = Units(self)
+        self.units = SessionUnits(self)
         """The scales of axes, and quantities in lines."""
         self.path = LinePath(self, self.automations, self.units)
         self.verbs = VerbPath(self)
@@ -226,7 +226,7 @@ class Session(Workspace):
         It waits until what was stopped has ended and what was sent is answered, for the time-outs of the lines at
         most, and then reads for two seconds at most. A line whose question is open is not sent yet.
         """
-        await self.tasks.stopped(ENDING)
+        await self.tasks.stopped(END_TIMEOUT)
         late: list[str] = []
         if not self.questions.open.busy:
             late = await self.unanswered.answered(max((bus.line.timeout for bus in self.buses.values()), default=0.0))
@@ -247,7 +247,7 @@ def begin(session: Session) -> list[str]:
     for feature in registry.features():
         for each in registry.records((feature,), AtSession):
             why: list[str] = []
-            with registry.Attempt(why):
+            with registry.GuardedCall(why):
                 at_once(each.begin)
                 each.begin(session)
             warnings += [f"the feature {feature.name} cannot begin: {text}" for text in why]

@@ -35,10 +35,10 @@ class SessionHooks:
 
     def tell(self, functions: Sequence[OnBus], bus: Bus) -> None:
         """Call functions with a line; a defect of one keeps nothing else from being done."""
-        for each in functions:
+        for function in functions:
             with isolated(f"a hook on {bus.name}"):
                 try:
-                    each(bus)
+                    function(bus)
                 except SystemExit as end:
                     raise RuntimeError("a hook ends the program") from end
 
@@ -48,6 +48,6 @@ class SessionHooks:
 
     def part(self, kind: type[P]) -> P:
         """What a feature keeps. Raises LookupError where it keeps none."""
-        found = self._parts[kind]
-        assert isinstance(found, kind)
-        return found
+        part = self._parts[kind]
+        assert isinstance(part, kind)
+        return part

@@ -9,7 +9,7 @@ from multidrop.dialects.units import Takes
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.shell.session import Session
-    from multidrop.shell.units import Units
+    from multidrop.shell.units import SessionUnits
 
 
 def taken(drive: Drive, name: str) -> tuple[str, Takes] | None:
@@ -22,22 +22,22 @@ def taken(drive: Drive, name: str) -> tuple[str, Takes] | None:
     return (fields[0].axis, fields[0].takes) if fields else None
 
 
-def shown(units: Units, drive: Drive, name: str, value: object) -> str:
+def shown(units: SessionUnits, drive: Drive, name: str, value: object) -> str:
     """` (50 mm/s)`, to follow the value of a setting; empty where it has none in units."""
-    found = taken(drive, name) if isinstance(value, int | float) else None
-    return "" if found is None else units.words(drive, found[0], float(str(value)), found[1])
+    quantity = taken(drive, name) if isinstance(value, int | float) else None
+    return "" if quantity is None else units.words(drive, quantity[0], float(str(value)), quantity[1])
 
 
-def example(units: Units, drive: Drive, name: str) -> str:
+def example(units: SessionUnits, drive: Drive, name: str) -> str:
     """What a word takes, for a person: `a velocity without sign, as in {12.5 mm/s}; 1 mm/s is 10240`; else empty."""
-    found = taken(drive, name)
-    axis = units.of(drive, found[0]) if found is not None else None
+    quantity = taken(drive, name)
+    axis = units.of(drive, quantity[0]) if quantity is not None else None
     measure = axis.current if axis is not None else None
-    if found is None or axis is None or measure is None or not measure.counts(found[1]):
+    if quantity is None or axis is None or measure is None or not measure.counts(quantity[1]):
         return ""
-    takes = Takes.DISTANCE if found[1] is Takes.PLACE else found[1]
+    takes = Takes.DISTANCE if quantity[1] is Takes.PLACE else quantity[1]
     unit, one = measure.unit_for(takes), f"{abs(1 / measure.value(1, takes)):.6g}"
-    return f"{found[1].value}, as in {{12.5 {unit}}}; 1 {unit} is {one} ({axis.scale}){'' if axis.sure else '?'}"
+    return f"{quantity[1].value}, as in {{12.5 {unit}}}; 1 {unit} is {one} ({axis.scale}){'' if axis.sure else '?'}"
 
 
 def distance(session: Session, drive: Drive, axis: str, steps: int) -> str:

@@ -60,11 +60,11 @@ async def save(workspace: Workspace, file: str, scales: Scales = lambda drive: {
 async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     """Read one drive. Raises DriveError."""
     with running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        found = await transferring(drive, drive.family.values.snapshot(progress))
-    program = Held(tuple(Stored(at, text) for at, text in found.program))
+        snapshot = await transferring(drive, drive.family.values.snapshot(progress))
+    program = Held(tuple(Stored(at, text) for at, text in snapshot.program))
     if not program.lines:
-        return found
-    return replace(found, remarked=tuple(program_listing.remarked(workspace, drive, program)))
+        return snapshot
+    return replace(snapshot, remarked=tuple(program_listing.remarked(workspace, drive, program)))
 
 
 def described(snapshot: Snapshot) -> DriveText:
@@ -83,5 +83,7 @@ async def _bus(workspace: Workspace, bus: Bus, failures: list[DriveError], scale
         except DriveError as failure:
             failures.append(failure)
             missing.append(f"not in this file: {failure}")
-    name = "".join("-" if each in FORBIDDEN or not each.isprintable() else each for each in bus.name)
+    name = "".join(
+        "-" if character in FORBIDDEN or not character.isprintable() else character for character in bus.name
+    )
     return BusText(name, drives, bus.line.baud, missing)

@@ -17,9 +17,9 @@ from multidrop.drives.stopping import Fate, Halt
 E_STOP = " - use the E-stop"
 NOT_OPEN = "still being opened"
 UNCONFIRMED = "had velocity 0 once, but not twice at one position"
-GAP = "   "
+COLUMN_GAP = "   "
 RESUME = "/resume lets macros run"
-SHOWN = 8
+MOST_NAMED_DRIVES = 8
 """The largest number of names in one place."""
 PARTS = {
     Fate.STANDING: ("■", "at rest"),
@@ -37,7 +37,7 @@ UNNAMED = (Fate.STANDING, Fate.SENT)
 
 
 @dataclass(frozen=True)
-class Found:
+class DriveFate:
     """The fate of one drive; of a whole bus if no drive is known on it."""
 
     fate: Fate
@@ -48,21 +48,21 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Tally:
+class FateTally:
     """The fates of the drives of a stop. `at` is its time of day."""
 
     at: datetime
-    found: tuple[Found, ...]
+    found: tuple[DriveFate, ...]
     vain: bool = False
     """A drive still moves, or its program runs, after several stops."""
 
-    def of(self, fate: Fate) -> list[Found]:
-        return [each for each in self.found if each.fate is fate]
+    def of(self, fate: Fate) -> list[DriveFate]:
+        return [drive for drive in self.found if drive.fate is fate]
 
     @property
     def stand(self) -> bool:
         """True if every drive was read at velocity 0 since the stop, and without a program that runs."""
-        return all(each.fate is Fate.STANDING for each in self.found)
+        return all(drive.fate is Fate.STANDING for drive in self.found)
 
     @property
     def urgent(self) -> bool:
@@ -72,71 +72,71 @@ class Tally:
     @property
     def sure(self) -> bool:
         """True if every drive was read since the stop, or was started again."""
-        return all(each.fate in (Fate.STANDING, Fate.STARTED) for each in self.found)
+        return all(drive.fate in (Fate.STANDING, Fate.STARTED) for drive in self.found)
 
 
 def of_buses(
     buses: Iterable[Bus], at: datetime, stopped_at: float, several: bool, opening: Iterable[str] = ()
-) -> Tally:
+) -> FateTally:
     """The tally since the last stop of everything, at `stopped_at` of the session's clock.
 
     `opening`: the URLs that were being opened then and still are.
     """
-    found = [Found(Fate.NOT_REACHED, url, url, NOT_OPEN) for url in opening]
+    fates = [DriveFate(Fate.NOT_REACHED, url, url, NOT_OPEN) for url in opening]
     vain = False
     for bus in buses:
         halt = bus.last_stop
         if halt is None or halt.at < stopped_at:
             halt = Halt(bus.link, stopped_at, 0, True, tuple(bus.all_drives), trouble=["opened since"])
         vain = vain or halt.vain
-        found += _found(halt, bus.all_drives, several)
-    return Tally(at, tuple(found), vain)
+        fates += _found(halt, bus.all_drives, several)
+    return FateTally(at, tuple(fates), vain)
 
 
-def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
+def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> FateTally:
     """The tally of stops of some drives each."""
     kept = list(halts)
-    found = [each for halt in kept for each in _found(halt, halt.affected, several)]
-    return Tally(at, tuple(found), any(halt.vain for halt in kept))
+    fates = [fate for halt in kept for fate in _found(halt, halt.affected, several)]
+    return FateTally(at, tuple(fates), any(halt.vain for halt in kept))
 
 
-def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found]:
+def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[DriveFate]:
     bus = halt.link.name
     lost = "lost" if halt.link.loss else ""
-    why = ", ".join(dict.fromkeys(each for each in (lost, *halt.trouble) if each))
+    why = ", ".join(dict.fromkeys(reason for reason in (lost, *halt.trouble) if reason))
     if not drives:
-        yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
+        yield DriveFate(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
     for drive in drives:
         name = (drive.label or drive.address) + halt.part_of(drive)
-        yield Found(halt.fate(drive), f"{bus}:{name}" if several and name else name or bus, bus, why)
+        yield DriveFate(halt.fate(drive), f"{bus}:{name}" if several and name else name or bus, bus, why)
 
 
-def names(tally: Tally, fate: Fate) -> str:
+def names(tally: FateTally, fate: Fate) -> str:
     """The drives with a fate by name, a whole bus by its own name, with the reason for a stop that failed."""
     listed: list[str] = []
     here = tally.of(fate)
-    for bus in dict.fromkeys(each.bus for each in here):
-        own = [each for each in here if each.bus == bus]
-        all_of_it = len(own) == sum(each.bus == bus for each in tally.found) and fate is Fate.NOT_REACHED
+    for bus in dict.fromkeys(drive.bus for drive in here):
+        own = [drive for drive in here if drive.bus == bus]
+        all_of_it = len(own) == sum(drive.bus == bus for drive in tally.found) and fate is Fate.NOT_REACHED
         reason = f" ({own[0].why})" if fate in (Fate.NOT_REACHED, Fate.NOT_KNOWN) and own[0].why else ""
-        listed.append((bus if all_of_it else ", ".join(each.name for each in own[:SHOWN])) + reason)
-        if not all_of_it and len(own) > SHOWN:
-            listed[-1] += f" and {len(own) - SHOWN} more"
+        listed.append((bus if all_of_it else ", ".join(drive.name for drive in own[:MOST_NAMED_DRIVES])) + reason)
+        if not all_of_it and len(own) > MOST_NAMED_DRIVES:
+            listed[-1] += f" and {len(own) - MOST_NAMED_DRIVES} more"
     return ", ".join(listed)
 
 
-def parts(tally: Tally, *, named: bool = True, calm: bool = True) -> list[str]:
+def parts(tally: FateTally, *, named: bool = True, calm: bool = True) -> list[str]:
     """One part for each fate: `9 stand`, `1 NOT KNOWN: noisy`. Without `calm` only the alarming fates."""
-    found = []
+    words = []
     for fate, (_, said) in PARTS.items():
         count = len(tally.of(fate))
         if count and (calm or fate not in CALM):
             who = f": {names(tally, fate)}" if named and fate not in UNNAMED else ""
-            found.append(f"{count} {said}{who}")
-    return found
+            words.append(f"{count} {said}{who}")
+    return words
 
 
-def words(tally: Tally) -> str:
+def words(tally: FateTally) -> str:
     """The tally in one line, such as `velocity 0 was read from all 12`."""
     if not tally.found:
         return "no drive is open"
@@ -147,13 +147,13 @@ def words(tally: Tally) -> str:
     return ", ".join(parts(tally)) + (E_STOP if tally.urgent else "")
 
 
-def headline(tally: Tally, width: int = 0) -> str:
+def headline(tally: FateTally, width: int = 0) -> str:
     """The banner: the tally and what to do. With a `width`, the longest wording that fits."""
     ways = _ways(tally)
-    return next((each for each in ways if not width or len(each) <= width), ways[-1])
+    return next((way for way in ways if not width or len(way) <= width), ways[-1])
 
 
-def _ways(tally: Tally) -> list[str]:
+def _ways(tally: FateTally) -> list[str]:
     """The wordings of the banner, from the longest to the shortest."""
     if tally.stand:
         sure = "■ STOPPED" if tally.found else "· NO STOP SENT"
@@ -161,7 +161,10 @@ def _ways(tally: Tally) -> list[str]:
         return [f"{head}       {RESUME}", head, f"{sure}   {RESUME}"]
     clock = f"{tally.at:%H:%M:%S}"
     if tally.sure:
-        return [GAP.join((f"■ STOP {clock}", *parts(tally), RESUME)), GAP.join(("■ STOP", *parts(tally, named=False)))]
+        return [
+            COLUMN_GAP.join((f"■ STOP {clock}", *parts(tally), RESUME)),
+            COLUMN_GAP.join(("■ STOP", *parts(tally, named=False))),
+        ]
     tail = E_STOP if tally.urgent else ""
     head = f"{next(sign for fate, (sign, _) in reversed(PARTS.items()) if tally.of(fate))} STOP SENT"
     rows = (
@@ -171,8 +174,8 @@ def _ways(tally: Tally) -> list[str]:
         (f"{head} {clock}", *parts(tally, named=False)),
         (head, *parts(tally, named=False, calm=False)),
     )
-    unsure = sum(each.fate not in CALM for each in tally.found)
-    return [*(GAP.join(row) + tail for row in rows), f"{head}{GAP}{unsure} NOT SURE{tail}"]
+    unsure = sum(fate.fate not in CALM for fate in tally.found)
+    return [*(COLUMN_GAP.join(row) + tail for row in rows), f"{head}{COLUMN_GAP}{unsure} NOT SURE{tail}"]
 
 
 def last_seen(drive: Drive, now: float) -> str:

@@ -17,9 +17,9 @@ from typing import TypeVar
 
 from multidrop.base.text import counted
 
-LIMIT = 64 * 1024
+QUEUE_BYTES = 64 * 1024
 """The largest number of bytes that wait for a reader, except those to keep."""
-MOST = 64 * 1024 * 1024
+MOST_HELD_BYTES = 64 * 1024 * 1024
 """The largest number of bytes that wait at all."""
 CHUNK = 16 * 1024
 """The number of bytes in one write."""
@@ -60,7 +60,7 @@ class BoundedWriter:
         write: Callable[[bytes], int],
         notice: Callable[[Loss], bytes],
         ended: Callable[[OSError | None], None],
-        limit: int = LIMIT,
+        limit: int = QUEUE_BYTES,
         chunk: int = CHUNK,
         name: str = "output",
     ) -> None:
@@ -90,7 +90,8 @@ class BoundedWriter:
         return not self.closed and (self._loss is not None or self._held > self._limit // 2)
 
     def put(self, data: bytes, keep: bool = False, count: int = 1) -> bool:
-        """Queue `count` lines; False if they were dropped for lack of room. `keep`: drop them only beyond MOST.
+        """Queue `count` lines; False if they were dropped for lack of room. `keep`: drop them only beyond
+        MOST_HELD_BYTES.
 
         After a loss there is no room until the reader catches up.
         """
@@ -98,7 +99,7 @@ class BoundedWriter:
             if self.closed or self._closing:
                 return False
             full = self._loss is not None or (self._held > 0 and self._held + len(data) > self._limit)
-            if self._held > MOST or (full and not keep):
+            if self._held > MOST_HELD_BYTES or (full and not keep):
                 now = time.time()
                 if self._loss is None:
                     self._loss = Loss(now, now)

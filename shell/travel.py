@@ -13,28 +13,28 @@ from multidrop.drives.drive import Drive, confirmed_motion
 from multidrop.shell.configuration import TRAVEL
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.origin import Origin
-from multidrop.shell.units import Axis, Units
+from multidrop.shell.units import ScaledAxis, SessionUnits
 
 
-async def ask(units: Units, drive: Drive, text: str, origin: Origin) -> None:
+async def ask(units: SessionUnits, drive: Drive, text: str, origin: Origin) -> None:
     """Ask before a move that leaves the travel of its axis; say once where the end is not known."""
     if drive.stores or (drive.address in EVERYONE and not units.workspace.bus(drive.link.name).all_drives):
         return
-    for each in units.meant(drive):
-        limited = {name: axis for name, axis in units.axes(each).items() if axis.scale.travel is not None}
-        if not limited or not each.starts(text):
+    for other in units.meant(drive):
+        limited = {name: axis for name, axis in units.axes(other).items() if axis.scale.travel is not None}
+        if not limited or not other.starts(text):
             continue
-        fields = [field for field in each.family.units.fields(text) if field.moves]
-        ends = each.family.only_ends(text)
-        if not fields and not ends and each.family.referencing(text) is None:
+        fields = [field for field in other.family.units.fields(text) if field.moves]
+        ends = other.family.only_ends(text)
+        if not fields and not ends and other.family.referencing(text) is None:
             for name, axis in limited.items():
-                _unchecked(units, each, name, axis, f"the end of '{text}' is not known")
+                _unchecked(units, other, name, axis, f"the end of '{text}' is not known")
         for field in fields:
             if field.axis in limited:
-                await _check(units, each, field, limited[field.axis], text, origin)
+                await _check(units, other, field, limited[field.axis], text, origin)
 
 
-def unchecked(units: Units, drive: Drive, text: str) -> None:
+def unchecked(units: SessionUnits, drive: Drive, text: str) -> None:
     """Say that the travel is not checked of what a verb starts: a program, or a line that begins one."""
     family = drive.family
     if text and any(field.moves for field in family.units.fields(text)):
@@ -46,14 +46,14 @@ def unchecked(units: Units, drive: Drive, text: str) -> None:
             _unchecked(units, drive, name, axis, f"{what} is not known")
 
 
-def _unchecked(units: Units, drive: Drive, name: str, axis: Axis, why: str) -> None:
+def _unchecked(units: SessionUnits, drive: Drive, name: str, axis: ScaledAxis, why: str) -> None:
     if not axis.told:
         axis.told = True
         told = f"{units.name(drive, name)}: travel not checked: {why}"
         units.workspace.notify(told, bus=drive.link.name, warning=True)
 
 
-async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str, origin: Origin) -> None:
+async def _check(units: SessionUnits, drive: Drive, field: Field, axis: ScaledAxis, text: str, origin: Origin) -> None:
     name, travel = units.name(drive, field.axis), axis.scale.travel
     assert travel is not None
     takes = await units.target([drive], [field]) or field.takes
@@ -66,7 +66,7 @@ async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str
         if takes is Takes.PLACE:
             return await _confirm(units, f"'{text}' may leave the travel: {why}", name, origin)
         return _unchecked(units, drive, field.axis, axis, why)
-    motion = next((each for each in await confirmed_motion(drive) if each.axis == field.axis), None)
+    motion = next((of_axis for of_axis in await confirmed_motion(drive) if of_axis.axis == field.axis), None)
     at_rest = motion is not None and not motion.velocity
     if motion is None or not (at_rest or takes is Takes.PLACE):
         return _unchecked(units, drive, field.axis, axis, "it moves")
@@ -79,7 +79,7 @@ async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str
         await _confirm(units, f"'{text}' ends at {measure.shown(end)}, and the travel is {low} to {high}", name, origin)
 
 
-async def _confirm(units: Units, what: str, name: str, origin: Origin) -> None:
+async def _confirm(units: SessionUnits, what: str, name: str, origin: Origin) -> None:
     if not (origin.beyond or TRAVEL in units.workspace.settings.guards.off):
         await units.workspace.questions.confirm(what, name, by=origin.by, beyond=True)
 

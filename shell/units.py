@@ -46,7 +46,7 @@ _UNQUOTED = re.compile(r'"[^"]*(?:"|$)')
 
 
 @dataclass(eq=False)
-class Axis:
+class ScaledAxis:
     """The scale of one axis, with what it rests on as last read and accepted."""
 
     scale: Scale
@@ -76,7 +76,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Line:
+class PreparedLine:
     """A line as it is sent: its text, what runs right before it, and its quantities as shown."""
 
     text: str
@@ -84,7 +84,7 @@ class Line:
     values: str = ""
 
 
-class Compared(NamedTuple):
+class ComparedQuantity(NamedTuple):
     """A quantity in a condition: the drive's own number, not rounded, and what runs right before the question."""
 
     number: float
@@ -93,14 +93,14 @@ class Compared(NamedTuple):
     """Shows a value of the drive with its unit."""
 
 
-class Units:
+class SessionUnits:
     """The units of one session."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
         self.shown = True
         """Positions are shown in units where an axis has a scale."""
-        self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
+        self._axes: WeakKeyDictionary[Drive, dict[str, ScaledAxis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
         self._checks = ScaleChecks(workspace)
 
@@ -129,22 +129,22 @@ class Units:
     def own(self) -> tuple[str, ...]:
         """The own units of the configuration, and those in which a simulated cell has scales."""
         scales = (axis.scale for axes in self._axes.values() for axis in axes.values())
-        return (*self.workspace.settings.own_units, *(each.kind for each in scales if each.kind == each.unit.name))
+        return (*self.workspace.settings.own_units, *(scale.kind for scale in scales if scale.kind == scale.unit.name))
 
-    def axes(self, drive: Drive) -> dict[str, Axis]:
+    def axes(self, drive: Drive) -> dict[str, ScaledAxis]:
         """The scales of a drive by axis, as in `Motion.axis`."""
-        found = self._axes.get(drive)
-        if found is None:
-            found = self._axes[drive] = {}
+        scales = self._axes.get(drive)
+        if scales is None:
+            scales = self._axes[drive] = {}
             for key, scale in self._configured(drive).items():
                 if drive.address in EVERYONE:
                     break
                 address, _, axis = key.partition(".")
                 if address in _names(drive):
                     axes = [axis.lower()] if axis else drive.family.units.axes()
-                    found |= {each: Axis(scale) for each in axes}
-            _anchor(drive, found)
-        return found
+                    scales |= {each: ScaledAxis(scale) for each in axes}
+            _anchor(drive, scales)
+        return scales
 
     def _configured(self, drive: Drive) -> dict[str, Scale]:
         """The scales of a line's drives: those of its simulated cell, and before them those of its saved connection."""
@@ -155,13 +155,13 @@ class Units:
         saved = self.workspace.settings.connections.get(record.connection.name) if record.connection else None
         return {**record.opened.units, **(saved.units if saved is not None else {})}
 
-    def of(self, drive: Drive, axis: str = "") -> Axis | None:
+    def of(self, drive: Drive, axis: str = "") -> ScaledAxis | None:
         """The scale of an axis; None: it has none."""
-        found = self.axes(drive).get(axis)
-        if found is not None:
-            found.sure = found.sure and not _runs(drive)
-            found.holds = drive.scale_holds(axis)
-        return found
+        scaled = self.axes(drive).get(axis)
+        if scaled is not None:
+            scaled.sure = scaled.sure and not _runs(drive)
+            scaled.holds = drive.scale_holds(axis)
+        return scaled
 
     def scales(self, drive: Drive) -> dict[str, Scale]:
         """The scales of a drive by axis, for a cell file."""
@@ -172,32 +172,32 @@ class Units:
 
         None: it has no scale, or none that holds.
         """
-        found = self.of(drive, axis)
-        measure = found.current if found is not None else None
-        if found is None or measure is None or not measure.counts(takes):
+        scaled = self.of(drive, axis)
+        measure = scaled.current if scaled is not None else None
+        if scaled is None or measure is None or not measure.counts(takes):
             return None
         unit = measure.unit_for(takes)
-        return round(measure.value(number, takes), 9), unit if found.sure else f"{unit}?"
+        return round(measure.value(number, takes), 9), unit if scaled.sure else f"{unit}?"
 
     def words(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> str:
         """` (12.5 mm)`, to follow a number of an axis.
 
         Empty where it has no scale, or none that holds, or a person wants no units.
         """
-        found = self.of(drive, axis) if self.shown else None
-        measure = found.current if found is not None else None
-        if found is None or measure is None or not measure.counts(takes):
+        scaled = self.of(drive, axis) if self.shown else None
+        measure = scaled.current if scaled is not None else None
+        if scaled is None or measure is None or not measure.counts(takes):
             return ""
-        return f" ({measure.shown(number, takes)}{'' if found.sure else '?'})"
+        return f" ({measure.shown(number, takes)}{'' if scaled.sure else '?'})"
 
     def referenced(self, drive: Drive, axis: str) -> bool:
         """Whether places of the machine count."""
         return not drive.state.unreferenced & {axis, ""}
 
-    def set(self, drive: Drive, axis: str, scale: Scale) -> Axis:
+    def set(self, drive: Drive, axis: str, scale: Scale) -> ScaledAxis:
         """Give an axis a scale."""
         axes = self.axes(drive)
-        axes[axis] = Axis(scale)
+        axes[axis] = ScaledAxis(scale)
         _anchor(drive, axes)
         self.workspace.scaled = True
         return axes[axis]
@@ -236,14 +236,14 @@ class Units:
 
     async def measure(self, drive: Drive, axis: str) -> Measure:
         """The measure of an axis; what it rests on is read where it was not. Raises Diagnostic where there is none."""
-        found, name = self.of(drive, axis), self.name(drive, axis)
-        if found is None:
+        scaled, name = self.of(drive, axis), self.name(drive, axis)
+        if scaled is None:
             raise Diagnostic(f"{name} has no scale", "", f"/units {self.typed(drive, axis)} 5 mm/turn gives it one")
-        if found.basis is None:
+        if scaled.basis is None:
             await self.confirm(drive)
-        if found.measure is None:
-            raise Diagnostic(f"{name}: {found.problem}")
-        return found.measure
+        if scaled.measure is None:
+            raise Diagnostic(f"{name}: {scaled.problem}")
+        return scaled.measure
 
     def name(self, drive: Drive, axis: str) -> str:
         shown = self.workspace.display_name(drive) or drive.shown
@@ -256,14 +256,14 @@ class Units:
 
     # Quantities in lines
 
-    async def line(self, drive: Drive, text: str) -> Line:
+    async def line(self, drive: Drive, text: str) -> PreparedLine:
         """Convert the quantities of a line for a drive.
 
         Raises Diagnostic for a quantity that the line or the axis cannot take, Refused in program mode.
         """
         # A quantity that is written wrongly is refused before anything is converted.
         bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
-        found = list(quantities(text))
+        matches = list(quantities(text))
         if brace := strange_brace(text):
             if re.search(r"\d,\d", brace):
                 quantity(brace.strip("{}"), self.own)
@@ -275,9 +275,9 @@ class Units:
                 meant = text[: unit.start()] + written + text[unit.end() :]
                 if any(field.start == unit.start() for field in drive.family.units.fields(meant)):
                     raise Diagnostic(f"{unit[0]} has a unit; nothing was sent", text.strip(), f"write {meant.strip()}")
-        return await self._converted(drive, text, found) if found else Line(text)
+        return await self._converted(drive, text, matches) if matches else PreparedLine(text)
 
-    async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> Line:
+    async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> PreparedLine:
         name = self.workspace.display_name(drive) or drive.shown
         if drive.stores:
             raise Refused(f"{name} is in program mode, which takes no quantity; nothing was sent")
@@ -305,41 +305,47 @@ class Units:
             at = match.end()
             used[field.axis] = measure
         sent = "".join(pieces) + text[at:]
-        return Line(sent, await self._check(drive, used, target, sent, placed), ", ".join(values))
+        return PreparedLine(sent, await self._check(drive, used, target, sent, placed), ", ".join(values))
 
     def meant(self, drive: Drive) -> list[Drive]:
         """The drives that a line goes to."""
         if drive.address not in EVERYONE:
             return [drive]
-        found = self.workspace.bus(drive.link.name).all_drives
-        if not found:
+        drives = self.workspace.bus(drive.link.name).all_drives
+        if not drives:
             raise Diagnostic(f"{drive.link.name}: no drive has replied, so no scale is known; nothing was sent")
-        return found
+        return drives
 
     async def target(self, drives: Sequence[Drive], fields: Iterable[Field]) -> Takes | None:
         """Read what a target means to each of these drives. Raises Diagnostic where they differ."""
         if not any(field.takes is Takes.TARGET for field in fields):
             return None
-        found = {await each.run(each.family.units.target()) for each in drives if each.family.units.offers("target")}
-        if len(found) != 1:
+        targets = {
+            await drive.run(drive.family.units.target()) for drive in drives if drive.family.units.offers("target")
+        }
+        if len(targets) != 1:
             raise Diagnostic("targets are positions for some drives and distances for others; nothing was sent")
-        return found.pop()
+        return targets.pop()
 
     async def _common(self, drives: Sequence[Drive], axis: str) -> Measure:
         """The measure that these drives have in common. Raises Diagnostic where they have several."""
-        found = [await self.measure(each, axis) for each in drives]
-        for each, other in zip(drives, found, strict=True):
-            if (other.count, other.scale.zero, other.basis) != (found[0].count, found[0].scale.zero, found[0].basis):
-                names = f"{self.name(drives[0], axis)} and {self.name(each, axis)}"
+        measures = [await self.measure(drive, axis) for drive in drives]
+        for drive, other in zip(drives, measures, strict=True):
+            if (other.count, other.scale.zero, other.basis) != (
+                measures[0].count,
+                measures[0].scale.zero,
+                measures[0].basis,
+            ):
+                names = f"{self.name(drives[0], axis)} and {self.name(drive, axis)}"
                 raise Diagnostic(f"{names} have different scales; nothing was sent", "", "name one drive")
-        return found[0]
+        return measures[0]
 
     def _check_referenced(self, drives: Sequence[Drive], axis: str) -> None:
-        for each in drives:
-            if not self.referenced(each, axis):
-                name, found = self.name(each, axis), self.of(each, axis)
-                unit = found.scale.unit.name if found is not None else "mm"
-                hint = f"home it, or /units here {self.typed(each, axis)} 0 {unit} where it is"
+        for drive in drives:
+            if not self.referenced(drive, axis):
+                name, scaled = self.name(drive, axis), self.of(drive, axis)
+                unit = scaled.scale.unit.name if scaled is not None else "mm"
+                hint = f"home it, or /units here {self.typed(drive, axis)} 0 {unit} where it is"
                 raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
 
     async def _check(
@@ -377,36 +383,36 @@ class Units:
     def _same(self, drive: Drive, name: str, measure: Measure, text: str) -> Procedure[None]:
         """Read what a scale rests on. Raises Differs where it is not what a measure was made with."""
         recounts = drive.state.recounts
-        found = yield from drive.family.units.basis(name, measure.scale.full_steps)
+        basis = yield from drive.family.units.basis(name, measure.scale.full_steps)
         axis = self.axes(drive)[name]
-        drive.counting.saw(name, found.settings, recounts)
+        drive.counting.saw(name, basis.settings, recounts)
         if axis.scale != measure.scale:
             raise Differs(f"{drive.shown}: its scale was changed meanwhile; '{text}' was not sent")
-        if found.settings != measure.basis.settings:
+        if basis.settings != measure.basis.settings:
             self.lost(drive, name, axis)
             before = dict(measure.basis.settings)
             was = [
-                f"{key} was {before.get(key)} and is {now} now" for key, now in found.settings if before.get(key) != now
+                f"{key} was {before.get(key)} and is {now} now" for key, now in basis.settings if before.get(key) != now
             ]
             hint = f"/units {self.typed(drive, name)} takes it as it is now"
             raise Differs(f"{drive.shown}: {', '.join(was)}: its scale rests on that, so '{text}' was not sent; {hint}")
         axis.sure = not _runs(drive)
 
-    def lost(self, drive: Drive, name: str, axis: Axis) -> None:
+    def lost(self, drive: Drive, name: str, axis: ScaledAxis) -> None:
         axis.sure = False
         if axis.scale.anchored:
             drive.state.reference_lost([name])
 
     # Quantities in conditions
 
-    async def condition(self, drive: Drive, question: str, text: str, within: bool = False) -> Compared:
+    async def condition(self, drive: Drive, question: str, text: str, within: bool = False) -> ComparedQuantity:
         """Convert a quantity that is compared with the value of a question; `within`: it is a tolerance."""
-        found = drive.family.units.reads(question)
-        if found is None:
+        question_takes = drive.family.units.reads(question)
+        if question_takes is None:
             raise Diagnostic(
                 f"{text}: '{question}' prints no quantity", self.name(drive, ""), "compare it with a number"
             )
-        axis, takes = found
+        axis, takes = question_takes
         if drive.stores:
             raise Refused(f"{self.name(drive, '')} is in program mode, which takes no quantity")
         measure, given = await self.measure(drive, axis), quantity(text.strip("{}"), self.own)
@@ -416,8 +422,8 @@ class Units:
             self._check_referenced([drive], axis)
         number = measure.number(given, takes)
         check = await self._check(drive, {axis: measure}, None, question)
-        shown = partial(measure.shown, takes=found[1])
-        return Compared(abs(number) if within else number, check, shown)
+        shown = partial(measure.shown, takes=question_takes[1])
+        return ComparedQuantity(abs(number) if within else number, check, shown)
 
     async def reading(self, drive: Drive, axis: str, what: str, unit: str) -> float:
         """Read the position or the velocity of an axis in a unit; what its scale rests on comes first.
@@ -431,31 +437,31 @@ class Units:
         if takes is Takes.PLACE:
             self._check_referenced([drive], axis)
         await drive.run(self._same(drive, axis, measure, f"{what} in {unit}"))
-        motion = next(each for each in await drive.motion() if each.axis == axis)
+        motion = next(of_axis for of_axis in await drive.motion() if of_axis.axis == axis)
         number = motion.position if takes is Takes.PLACE else motion.velocity
         return float(measure.base(number, takes, wanted))
 
     # Here
 
-    async def here(self, drive: Drive, axis: str, text: str) -> Axis:
+    async def here(self, drive: Drive, axis: str, text: str) -> ScaledAxis:
         """Have the position at rest be a place from now on. Raises Diagnostic while it moves."""
         measure, given = await self.measure(drive, axis), quantity(text, self.own)
         await self.confirm(drive)
-        motion = next((each for each in await confirmed_motion(drive) if each.axis == axis), None)
+        motion = next((of_axis for of_axis in await confirmed_motion(drive) if of_axis.axis == axis), None)
         if motion is None or motion.velocity:
             raise Diagnostic(f"{self.name(drive, axis)} moves", "/units here", "wait until it is at rest")
-        found = self.axes(drive)[axis]
+        scaled = self.axes(drive)[axis]
         if given.unit.kind != measure.scale.kind or given.unit.per:
             raise Diagnostic(f"{given}: the scale is {measure.scale}", "/units here", f"use {measure.unit}")
-        scale = found.scale.with_zero(Fraction(0))
-        zero = given.base - Measure(scale, found.basis or Basis()).exact(motion.position)
-        basis = found.basis
-        found = self.set(drive, axis, replace(scale, zero=zero))
+        scale = scaled.scale.with_zero(Fraction(0))
+        zero = given.base - Measure(scale, scaled.basis or Basis()).exact(motion.position)
+        basis = scaled.basis
+        scaled = self.set(drive, axis, replace(scale, zero=zero))
         if basis is not None:
-            found.accept(basis)
+            scaled.accept(basis)
         drive.state.referenced(axis)
         self.workspace.changed()
-        return found
+        return scaled
 
 
 def _names(drive: Drive) -> set[str]:
@@ -463,7 +469,7 @@ def _names(drive: Drive) -> set[str]:
     return {drive.address or "!", *filter(None, (drive.label, drive.state.name if not drive.address else ""))}
 
 
-def _anchor(drive: Drive, axes: dict[str, Axis]) -> None:
+def _anchor(drive: Drive, axes: dict[str, ScaledAxis]) -> None:
     drive.anchored = frozenset(name for name, axis in axes.items() if axis.scale.anchored)
 
 

@@ -17,23 +17,23 @@ from typing import TYPE_CHECKING, Any
 from multidrop.base.errors import Diagnostic, DriveError, NoAnswer, Timeout, TransportLost
 from multidrop.dialects import Motion
 from multidrop.drives.bus import Bus
-from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
+from multidrop.drives.drive import LEAST_REST, Check, Drive, ProgramReading, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE
-from multidrop.shell.motions import Watch, check_own
+from multidrop.shell.motions import MotionWatch, check_own
 from multidrop.shell.origin import Origin
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.shell.workspace import Workspace
 
 if TYPE_CHECKING:  # few sessions need it
-    from multidrop.shell.units import Units
+    from multidrop.shell.units import SessionUnits
 
-LIMIT = 60.0
+WAIT_TIMEOUT = 60.0
 """The default time limit, s."""
-APART = REST
+READING_INTERVAL = LEAST_REST
 """The time between the two readings of a drive at rest, and between those of a value, s."""
 LISTENING = 0.5
 """The time between two looks for a failed motion while a text is awaited, s."""
-SHOWN = 3
+MOST_SHOWN_LINES = 3
 """The number of lines that a wait for a text shows when it runs out."""
 SIGNS: Mapping[str, Callable[[float, float], bool]] = {
     "=": operator.eq,
@@ -51,7 +51,7 @@ _CONDITION = re.compile(
 
 
 @dataclass(frozen=True)
-class Condition:
+class WaitCondition:
     """A value that a drive must report: `I1=1` of the selected drive, `@b P>=51200` of another one."""
 
     target: str
@@ -71,13 +71,13 @@ class Condition:
         return SIGNS[self.sign](seen, self.value)
 
 
-def condition(text: str) -> Condition | None:
+def condition(text: str) -> WaitCondition | None:
     """Parse a condition; None for another text."""
     match = _CONDITION.fullmatch(text.strip())
     if match is None:
         return None
     target, quantity = match["target"] or "", match["quantity"] or ""
-    return Condition(target, match["word"], match["sign"], int(match["value"] or 0), quantity)
+    return WaitCondition(target, match["word"], match["sign"], int(match["value"] or 0), quantity)
 
 
 def seconds(text: str, wrong: Callable[[str], Exception]) -> float:
@@ -100,7 +100,7 @@ async def wait(
     drives: Sequence[Drive] | None = None,
     said: str = "",
     ended: bool = False,
-) -> Watch:
+) -> MotionWatch:
     """Wait until every drive is at rest in two readings, its motion over; with `idle`, also until no program runs.
 
     `drives` None: those that this session sent a line to, else the selected one. `said`: what a person called this.
@@ -108,7 +108,7 @@ async def wait(
     `limit` seconds, DriveError for a drive in program mode (it would store the question).
     """
     deadline = workspace.now() + limit
-    watch = Watch(workspace, origin, _addressed(workspace) if drives is None else drives, ended)
+    watch = MotionWatch(workspace, origin, _addressed(workspace) if drives is None else drives, ended)
     for drive in watch.drives:
         _check_asked(workspace, drive)
     await watch.begin()
@@ -116,7 +116,7 @@ async def wait(
         if workspace.now() >= deadline:
             verb = said or f"/wait {'ended' if ended else 'idle' if idle else 'stopped'}"
             raise Timeout(f"{verb}: {workspace.display_name(moving)} still runs after {limit:g} s")
-        await sleep(APART)
+        await sleep(READING_INTERVAL)
     return watch
 
 
@@ -124,11 +124,11 @@ def _addressed(workspace: Workspace) -> list[Drive]:
     """The drives that this session sent a line to, else the selected one."""
     addressed = [(workspace.buses[bus].drives, address) for bus, address in sorted(workspace.addressed)]
     each_of = [(known, known if address in EVERYONE else [address]) for known, address in addressed]
-    found = [known[address] for known, addresses in each_of for address in addresses if address in known]
-    return list(dict.fromkeys(found)) or [workspace.drive()]
+    drives = [known[address] for known, addresses in each_of for address in addresses if address in known]
+    return list(dict.fromkeys(drives)) or [workspace.drive()]
 
 
-async def _moving(workspace: Workspace, watch: Watch, idle: bool) -> Drive | None:
+async def _moving(workspace: Workspace, watch: MotionWatch, idle: bool) -> Drive | None:
     """The first drive that is not at rest, in one place, in both of two readings, or whose motion is not over.
 
     The others are read on only as long as a motion of this sequence may have failed there meanwhile.
@@ -137,7 +137,7 @@ async def _moving(workspace: Workspace, watch: Watch, idle: bool) -> Drive | Non
     moving: Drive | None = None
     for reading in range(2):
         if reading:
-            await sleep(APART)
+            await sleep(READING_INTERVAL)
         for drive in watch.left:
             if (moving is not None and not watch.own(drive)) or (reading and drive not in before):
                 continue
@@ -172,9 +172,9 @@ async def wait_value(
     workspace: Workspace,
     origin: Origin,
     drive: Drive,
-    wanted: Condition,
+    wanted: WaitCondition,
     limit: float,
-    units: Units | None,
+    units: SessionUnits | None,
     said: str = "/wait",
 ) -> None:
     """Wait until a drive reports a value. Raises Timeout after `limit` seconds, Diagnostic for no such value.
@@ -190,10 +190,10 @@ async def wait_value(
         if workspace.now() >= deadline:
             raise Timeout(f"{said} {wanted.text}: {name} still reports {seen} after {limit:g} s")
         await check_own(workspace, origin)
-        await sleep(APART)
+        await sleep(READING_INTERVAL)
 
 
-def question(workspace: Workspace, drive: Drive, wanted: Condition) -> str:
+def question(workspace: Workspace, drive: Drive, wanted: WaitCondition) -> str:
     """The line that asks for the value. Raises Diagnostic."""
     name = workspace.display_name(drive)
     if drive.link.name in workspace.raw:
@@ -220,7 +220,7 @@ async def wait_text(workspace: Workspace, origin: Origin, text: str, limit: floa
     It ends early with MotionFailed once a motion of this automation has failed. Raises Timeout after `limit` seconds.
     """
     if not await listened(workspace, origin, partial(workspace.lately.finds, origin, text), limit):
-        seen = ", ".join(f'"{line}"' for line in workspace.lately.last(SHOWN)) or "nothing"
+        seen = ", ".join(f'"{line}"' for line in workspace.lately.last(MOST_SHOWN_LINES)) or "nothing"
         raise Timeout(f'/wait "{text}": not printed within {limit:g} s; seen {seen}')
 
 
@@ -269,9 +269,9 @@ class Standing:
         if not self.axes:
             return f"{self.name} not known ({self.why})"
         if self.unconfirmed:
-            now = " and ".join(f"{each.position}{place}" for each, place in self._placed)
+            now = " and ".join(f"{motion.position}{place}" for motion, place in self._placed)
             return f"{self.name} {UNCONFIRMED}; now {now}"
-        return f"{self.name} {' and '.join(_axis(*each) for each in self._placed)}"
+        return f"{self.name} {' and '.join(_axis(*motion) for motion in self._placed)}"
 
     @property
     def _placed(self) -> list[tuple[Motion, str]]:
@@ -283,10 +283,10 @@ class Standing:
         if not self.axes:
             return None
         facts: dict[str, dict[str, Any]] = {}
-        for each, quantity in zip(self.axes, self.quantities or [None] * len(self.axes), strict=True):
-            facts[each.axis] = {"position": each.position, "velocity": each.velocity}
+        for axis, quantity in zip(self.axes, self.quantities or [None] * len(self.axes), strict=True):
+            facts[axis.axis] = {"position": axis.position, "velocity": axis.velocity}
             if quantity is not None:
-                facts[each.axis] |= {"quantity": quantity[0], "unit": quantity[1]}
+                facts[axis.axis] |= {"quantity": quantity[0], "unit": quantity[1]}
         return facts[""] if list(facts) == [""] else facts
 
 
@@ -296,39 +296,41 @@ def _axis(each: Motion, place: str) -> str:
     return f"{axis}moves at {each.velocity} a second at {at}" if each.velocity else f"{axis}is at rest at {at}"
 
 
-async def standings(workspace: Workspace, drives: Iterable[Drive], units: Units | None = None) -> tuple[Standing, ...]:
+async def standings(
+    workspace: Workspace, drives: Iterable[Drive], units: SessionUnits | None = None
+) -> tuple[Standing, ...]:
     """Read the positions of drives: those of one bus in turn, ANSWER_LIMIT at most for each bus."""
     by_bus: dict[str, list[Drive]] = {}
     for drive in drives:
         by_bus.setdefault(drive.link.name, []).append(drive)
-    found = await asyncio.gather(*(_standing(workspace, each, units) for each in by_bus.values()))
-    return tuple(each for bus in found for each in bus)
+    of_buses = await asyncio.gather(*(_standing(workspace, each, units) for each in by_bus.values()))
+    return tuple(standing for bus in of_buses for standing in bus)
 
 
-async def _standing(workspace: Workspace, drives: Sequence[Drive], units: Units | None) -> list[Standing]:
+async def _standing(workspace: Workspace, drives: Sequence[Drive], units: SessionUnits | None) -> list[Standing]:
     """Read the drives of one bus; the line has no time left for those that the limit leaves out."""
-    found = {drive: Standing(workspace.display_name(drive), why="no time was left to ask") for drive in drives}
+    states = {drive: Standing(workspace.display_name(drive), why="no time was left to ask") for drive in drives}
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(ANSWER_LIMIT):
             for drive in drives:
                 name = workspace.display_name(drive)
                 try:
-                    found[drive] = Standing(name, why=_unasked(drive))
-                    if not found[drive].why:
-                        found[drive] = Standing(name, why="no answer")
+                    states[drive] = Standing(name, why=_unasked(drive))
+                    if not states[drive].why:
+                        states[drive] = Standing(name, why="no answer")
                         axes = await confirmed_motion(drive)
-                        found[drive] = Standing(
+                        states[drive] = Standing(
                             name,
                             axes,
                             unconfirmed=not (
                                 any(axis.velocity for axis in axes) or (drive.seen and drive.seen.at_rest())
                             ),
-                            places=tuple(units.words(drive, each.axis, each.position) for each in axes if units),
-                            quantities=tuple(units.given(drive, each.axis, each.position) for each in axes if units),
+                            places=tuple(units.words(drive, axis.axis, axis.position) for axis in axes if units),
+                            quantities=tuple(units.given(drive, axis.axis, axis.position) for axis in axes if units),
                         )
                 except (DriveError, TransportLost) as failure:
-                    found[drive] = Standing(name, why=str(failure).removeprefix(f"{name}: "))
-    return [found[drive] for drive in drives]
+                    states[drive] = Standing(name, why=str(failure).removeprefix(f"{name}: "))
+    return [states[drive] for drive in drives]
 
 
 def _unconfirmed(drive: Drive) -> bool:
@@ -369,7 +371,7 @@ async def _read(bus: Bus) -> None:
                         await drive.busy()
 
 
-def _program(drive: Drive, now: float) -> Running | None:
+def _program(drive: Drive, now: float) -> ProgramReading | None:
     """True if a program runs in a drive, if that was read lately and after its last start."""
     running = drive.running
     return running if running is not None and running.at > max(now - PROGRAM_FRESH, drive.started_at) else None

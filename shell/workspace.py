@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
     from multidrop.drives.stopping import Halt
-    from multidrop.shell.connect.opening import Opened
+    from multidrop.shell.connect.opening import OpenedBus
     from multidrop.shell.connect.scheme import Connection
     from multidrop.shell.raw import RawLine, Watched
     from multidrop.shell.roles import Observer, OpenLog, RunningPlot, Series
@@ -58,7 +58,7 @@ class OpenBus:
     """An open bus, and what a session holds of it."""
 
     bus: Bus
-    opened: Opened
+    opened: OpenedBus
     connection: Connection | None
     """Its URL; None: a search opened it, or it mirrors one of another screen."""
     in_cell: str
@@ -137,7 +137,7 @@ class Workspace(Channel):
         self.names = KnownNames()
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
-        self.scaled = any(each.units for each in settings.connections.values())
+        self.scaled = any(connection.units for connection in settings.connections.values())
         """An axis may have a scale."""
         self.on_opened: list[Callable[[Bus], Awaitable[None]]] = []
         """Awaited with each bus whose drives were found, where an axis may have a scale."""
@@ -162,7 +162,7 @@ class Workspace(Channel):
 
     # Buses
 
-    def adopt(self, opened: Opened, place: int, connection: Connection | None = None, in_cell: str = "") -> OpenBus:
+    def adopt(self, opened: OpenedBus, place: int, connection: Connection | None = None, in_cell: str = "") -> OpenBus:
         """Add a bus and begin to read it; from here on a stop reaches it. Buses keep the order of their places."""
         bus = opened.bus
         unwatch = bus.watch(partial(self._on_bus, bus))
@@ -201,26 +201,28 @@ class Workspace(Channel):
     @property
     def raw(self) -> dict[str, RawLine]:
         """The buses in raw mode, by name."""
-        return {bus.name: each.raw for bus, each in self._open.items() if each.raw is not None}
+        return {bus.name: open_bus.raw for bus, open_bus in self._open.items() if open_bus.raw is not None}
 
     @property
     def cells(self) -> dict[str, RunningFloor]:
         """The running cells of simulated buses, by bus."""
-        return {bus.name: each.opened.floor for bus, each in self._open.items() if each.opened.floor is not None}
+        return {
+            bus.name: open_bus.opened.floor for bus, open_bus in self._open.items() if open_bus.opened.floor is not None
+        }
 
     def bus(self, name: str = "") -> Bus:
         """Find an open bus by name; the selected one where no name is given. Raises Diagnostic."""
         if not self.buses:
             raise Diagnostic("nothing is open", hint="/open URL opens a line of drives")
-        found = self.buses.get(name or self.selected_bus)
-        if found is None and not name and self.deselected:
+        bus = self.buses.get(name or self.selected_bus)
+        if bus is None and not name and self.deselected:
             hint = f"/use selects one: {', '.join(self.buses)}"
             raise Diagnostic("no bus is selected since the selected one was closed", hint=hint)
-        if found is None and not name:
+        if bus is None and not name:
             raise Diagnostic("no bus is ready yet", hint=f"{', '.join(self.buses)} is being opened")
-        if found is None:
+        if bus is None:
             raise Diagnostic(f"no bus {name}", hint=f"open: {', '.join(self.buses)}")
-        return found
+        return bus
 
     def of_demo(self, bus: str) -> str:
         """The name under which a bus of the demo cell is open; empty: it is not."""
@@ -233,8 +235,8 @@ class Workspace(Channel):
         if not 0 <= at + by < len(order):
             return
         order[at], order[at + by] = order[at + by], order[at]
-        for number, each in enumerate(order):
-            each.place = number / len(order)  # below 1, and so before what opens later
+        for number, open_bus in enumerate(order):
+            open_bus.place = number / len(order)  # below 1, and so before what opens later
         self._open, self.buses = _in_order(self._open)
         self.changed()
 
@@ -260,7 +262,7 @@ class Workspace(Channel):
         bus.link.name = name
         self._open, self.buses = _in_order(self._open)
         self.addressed = {(name if each == before else each, address) for each, address in self.addressed}
-        self.plotted = tuple(each._replace(bus=name) if each.bus == before else each for each in self.plotted)
+        self.plotted = tuple(series._replace(bus=name) if series.bus == before else series for series in self.plotted)
         self.reconnections.rename(before, name)
         if self.selected_bus == before:
             self.selected_bus = name
@@ -290,11 +292,11 @@ class Workspace(Channel):
         """
         chosen = self.bus(bus)
         if address:
-            found = _find(chosen, address)
-            if found is None:
+            drive = _find(chosen, address)
+            if drive is None:
                 hint = f"valid: {', '.join(chosen.drives)}" if chosen.drives else "no drive has replied there"
                 raise Diagnostic(f"no drive {address} on {chosen.name}", hint=hint)
-            self._open[chosen].selected = found
+            self._open[chosen].selected = drive
         self.selected_bus, self.deselected = chosen.name, False
         self.changed()
 
@@ -313,14 +315,14 @@ class Workspace(Channel):
             if selected is None:
                 raise NoAnswer(f"{chosen.name}: no drive has replied; @ADDR TEXT sends to one all the same")
             return selected
-        found = _find(chosen, address)
+        drive = _find(chosen, address)
         sole = chosen.drives.get("")
-        if found is None and sole is not None:
+        if drive is None and sole is not None:
             if address in EVERYONE:
                 return sole
             hint = f"@{chosen.name}: TEXT goes to it"
             raise Diagnostic(f"no address {address}: the drive on {chosen.name} takes none", hint=hint)
-        return found or chosen.at(address)
+        return drive or chosen.at(address)
 
     def qualified_address(self, drive: Drive) -> str:
         """The drive's address, valid whatever is selected later; empty where only one drive can be meant."""
@@ -386,7 +388,7 @@ class Workspace(Channel):
         self.latched, self.doubted = False, ""
         self.changed()
 
-    def tally(self) -> stop_report.Tally:
+    def tally(self) -> stop_report.FateTally:
         """The state of every drive since the last stop, as far as it was read."""
         at = self.wall(self.stopped_at if self.stops else self.now())
         opening = _still_opening(self.opening, self.stops)

@@ -50,7 +50,7 @@ DRIVE_KEYS = (
 )
 
 
-class Reader:
+class CellReader:
     """Reads cells with drives of some families, given by personality."""
 
     def __init__(self, families: Mapping[str, type[SimulatedFamily]]) -> None:
@@ -139,7 +139,7 @@ class Reader:
                 )
             names[drive.name] = number
         on_ethernet = any(self._is_ethernet(each.personality) for each in bus.drives)
-        own = next((each.scheme for each in bus.serve if each.scheme in own_ports()), "")
+        own = next((endpoint.scheme for endpoint in bus.serve if endpoint.scheme in own_ports()), "")
         if own and not on_ethernet:
             raise table.wrong("serve", f"has {own}://, and no drive of the bus serves it", f"valid: {self._ethernet}")
         if bus.gather is not None and on_ethernet:
@@ -147,16 +147,16 @@ class Reader:
 
     def _check_kinds(self, bus: BusSpec, where: str, text: str) -> None:
         """Refuse an endpoint that features serve for other drives than it is for, with the line that has it."""
-        for scheme in dict.fromkeys(each.scheme for each in bus.serve):
+        for scheme in dict.fromkeys(endpoint.scheme for endpoint in bus.serve):
             kind = None if scheme in _schemes() else kind_of(scheme)
             if kind is None or not kind.families:
                 continue
-            fits = [name for name, each in self._families.items() if each.name in kind.families]
-            others = [each.personality for each in bus.drives if each.personality not in fits]
+            fits = [name for name, family in self._families.items() if family.name in kind.families]
+            others = [drive.personality for drive in bus.drives if drive.personality not in fits]
             if others or not bus.drives:
-                found = f"{others[0]} {kind.lack}" if others else "the bus has no drive"
+                lack = f"{others[0]} {kind.lack}" if others else "the bus has no drive"
                 line = text.count("\n", 0, text.find(f"{scheme}:", text.find(f'"{bus.name}"'))) + 1
-                what = f"serve of [[bus]] {quoted(bus.name)} has {scheme}://, and {found}"
+                what = f"serve of [[bus]] {quoted(bus.name)} has {scheme}://, and {lack}"
                 raise Diagnostic(what, f"{where}:{line}", f"valid: a bus of {' or '.join(fits)} only")
 
     @property
@@ -175,7 +175,7 @@ def _schemes() -> tuple[str, ...]:
 def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:
     scheme, colon, rest = text.partition(":")
     if not colon or (scheme not in _schemes() and kind_of(scheme) is None):
-        *forms, last = (f"{each}://" for each in (*_schemes()[1:], *(each.scheme for each in kinds())))
+        *forms, last = (f"{each}://" for each in (*_schemes()[1:], *(kind.scheme for kind in kinds())))
         what = f"valid: pty:, {', '.join(forms)} or {last} at the beginning"
         raise table.wrong("serve", f"cannot be {quoted(text)}", what)
     if scheme == "pty":
@@ -194,7 +194,7 @@ def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:
 
 
 def _faults(table: Table) -> Faults:
-    table.only(*(each.name for each in fields(Faults)))
+    table.only(*(field.name for field in fields(Faults)))
     if "hangup_for" in table.values and "hangup_after" not in table.values:
         raise table.wrong("hangup_for", "needs hangup_after", "as in hangup_after = 30.0")
     chances = {
@@ -217,22 +217,22 @@ def _check_cell(cell: Cell, where: str) -> None:
         if bus.name in names:
             raise Diagnostic(f'two buses have the name "{bus.name}"', where, "use different names")
         names.add(bus.name)
-        for each in bus.serve:
-            place = each.path or (each.port and (each.scheme == "udp", each.host, each.port))
+        for endpoint in bus.serve:
+            place = endpoint.path or (endpoint.port and (endpoint.scheme == "udp", endpoint.host, endpoint.port))
             if place and place in taken:
-                message = f"serve {quoted(each.text)} uses the place of {quoted(taken[place])}"
+                message = f"serve {quoted(endpoint.text)} uses the place of {quoted(taken[place])}"
                 raise Diagnostic(message, f"{where}: [[bus]] {quoted(bus.name)}")
-            taken[place] = each.text
+            taken[place] = endpoint.text
 
 
-_READER = Reader(BY_PERSONALITY)
+_READER = CellReader(BY_PERSONALITY)
 load = _READER.load
 read = _READER.read
 
 
 def demo() -> Cell:
     """Read the cell that comes with the program: the buses that the families show, in order."""
-    buses = [bus for each in _shown() for bus in read(_text(each), "demo cell", each).buses]
+    buses = [bus for path in _shown() for bus in read(_text(path), "demo cell", path).buses]
     cell = Cell(seed=DEMO_SEED, buses=tuple(buses))
     _check_cell(cell, "demo cell")
     return cell
@@ -240,14 +240,14 @@ def demo() -> Cell:
 
 def _shown() -> list[Traversable]:
     """The folders with a demo.toml."""
-    return [resources.files(each.package) for each in registry.records(registry.families(), Demo)]
+    return [resources.files(record.package) for record in registry.records(registry.families(), Demo)]
 
 
 def _text(folder: Traversable) -> str:
     return folder.joinpath("demo.toml").read_text(encoding="utf-8")
 
 
-class Placed(NamedTuple):
+class CellDrive(NamedTuple):
     """A drive of a cell, and its table. `cell` is the path of the file, empty for the demo cell."""
 
     cell: str
@@ -262,34 +262,34 @@ class Placed(NamedTuple):
         return f"{self.cell}#{self.bus}:{self.spec.name}"
 
 
-def placed(cell: str, allow: Sequence[Path] = ()) -> Placed:
+def placed(cell: str, allow: Sequence[Path] = ()) -> CellDrive:
     """Find a drive: `CELL` if it has only one, else `CELL#BUS` or `CELL#BUS:NAME`. Raises Diagnostic.
 
     No CELL before the # means the demo cell, as in `sim:#press`. `allow`: as for `load`.
     """
-    found = matching(cell, allow)
-    if len(found) == 1:
-        return found[0]
+    specs = matching(cell, allow)
+    if len(specs) == 1:
+        return specs[0]
     path, _, place = cell.partition("#")
     where = path or "demo cell"
-    names = ", ".join(each.place for each in found or matching(path, allow))
-    what = f"{len(found)} drives match" if found else "no such drive"
+    names = ", ".join(spec.place for spec in specs or matching(path, allow))
+    what = f"{len(specs)} drives match" if specs else "no such drive"
     raise Diagnostic(what, f"{where}#{place}" if place else where, f"valid for --cell: {names}" if names else "")
 
 
-def matching(cell: str, allow: Sequence[Path] = ()) -> Sequence[Placed]:
+def matching(cell: str, allow: Sequence[Path] = ()) -> Sequence[CellDrive]:
     """All drives that `CELL`, `CELL#BUS` or `CELL#BUS:NAME` means. Raises Diagnostic."""
     path, _, place = cell.partition("#")
     bus, _, name = place.partition(":")
-    return [each for each in _drives(path, allow) if bus in ("", each.bus) and name in ("", each.spec.name)]
+    return [drive for drive in _drives(path, allow) if bus in ("", drive.bus) and name in ("", drive.spec.name)]
 
 
-def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
+def _drives(path: str, allow: Sequence[Path]) -> list[CellDrive]:
     texts = [utf8_of(path)] if path else [*map(_text, _shown())]
     shop = read(texts[0], path, Path(path).absolute().parent, allow) if path else demo()
     tables = [table for text in texts for table in toml_of(text, path).get("bus", [])]
     return [
-        Placed(path, bus.name, spec, _without_files(table, spec), shop.own_units)
+        CellDrive(path, bus.name, spec, _without_files(table, spec), shop.own_units)
         for bus, rows in zip(shop.buses, tables, strict=True)
         for spec, table in zip(bus.drives, rows.get("drive", []), strict=True)
     ]

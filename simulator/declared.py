@@ -24,7 +24,7 @@ class Simulated(NamedTuple):
 
     def claims(self) -> tuple[str, ...]:
         """What only one family can add."""
-        return (f"simulated {self.name}", *(f'personality = "{each}"' for each in self.personalities))
+        return (f"simulated {self.name}", *(f'personality = "{personality}"' for personality in self.personalities))
 
 
 class Demo(NamedTuple):
@@ -36,9 +36,9 @@ class Demo(NamedTuple):
 
 def own_ports() -> tuple[str, ...]:
     """The schemes of ports where each client gets the replies to its own messages."""
-    return tuple(each.own_port for each in simulated().values() if each.own_port)
+    return tuple(family.own_port for family in simulated().values() if family.own_port)
 
 
 def simulated() -> dict[str, Simulated]:
     """All simulated families by name, those of the wheel first."""
-    return {each.name: each for each in registry.records(registry.families(), Simulated)}
+    return {record.name: record for record in registry.records(registry.families(), Simulated)}

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 def _personalities() -> dict[str, str]:
-    return {personality: each.record for each in simulated().values() for personality in each.personalities}
+    return {personality: family.record for family in simulated().values() for personality in family.personalities}
 
 
 FAMILIES: Mapping[str, type[SimulatedFamily]] = OnDemand(
-    lambda: {name: each.record for name, each in simulated().items()}
+    lambda: {name: family.record for name, family in simulated().items()}
 )
 """By name."""
 PROGRAMS: Mapping[str, type[ProgramRun]] = OnDemand(
-    lambda: {name: each.programs for name, each in simulated().items() if each.programs}
+    lambda: {name: family.programs for name, family in simulated().items() if family.programs}
 )
 """The runs of program files, by the name of their family."""
 BY_PERSONALITY: Mapping[str, type[SimulatedFamily]] = OnDemand(_personalities)

@@ -30,7 +30,7 @@ class Device(Protocol):
     def supply(self, on: bool, now: float) -> None: ...  # noqa: D102
 
 
-class Connection(Protocol):
+class PortConnection(Protocol):
     """One client's connection to the own port of an Ethernet drive."""
 
     @property
@@ -91,7 +91,7 @@ class Unit:
     inputs: Sequence[int] = ()
     counts: int = 0
     single_supply: bool = False
-    connect: Callable[[], Connection] | None = None
+    connect: Callable[[], PortConnection] | None = None
     shadow: Shadow | None = None
     """None: it cannot run beside a real drive."""
     on_usb: UsbSide | None = None

@@ -17,7 +17,7 @@ from multidrop.simulator import USAGES
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
 from multidrop.simulator.declared import own_ports
 from multidrop.simulator.families import BY_PERSONALITY, family_of
-from multidrop.simulator.family import Connection, Device, Place, Unit
+from multidrop.simulator.family import Device, Place, PortConnection, Unit
 from multidrop.simulator.wire import Wire
 from multidrop.simulator.world import World
 
@@ -27,7 +27,7 @@ MOST_PUSH = 999_999_999
 
 
 @dataclass(frozen=True)
-class Placed:
+class FloorDrive:
     """A drive and where it is: its bus, its description in the cell, the simulated unit."""
 
     bus: str
@@ -60,7 +60,7 @@ class Floor:
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell
-        self.drives: list[Placed] = []
+        self.drives: list[FloorDrive] = []
         self.wires: dict[str, Wire] = {bus.name: self._wire(bus, cell.seed) for bus in cell.buses}
 
     @property
@@ -145,7 +145,7 @@ class Floor:
         held = _on(words[1], where)
         return lambda now: world.hold(held)
 
-    def own_port(self, bus: str) -> Connection:
+    def own_port(self, bus: str) -> PortConnection:
         """Connect to the own port of the Ethernet drive of a bus. Raises Diagnostic if there is none.
 
         What comes by it can change the drive: the bus's wire is to `look_again`.
@@ -153,7 +153,7 @@ class Floor:
         for unit in self._ethernet(bus):
             if unit.connect is not None:
                 return unit.connect()
-        names = " and ".join(name for name, each in BY_PERSONALITY.items() if name in each.ethernet)
+        names = " and ".join(name for name, family in BY_PERSONALITY.items() if name in family.ethernet)
         raise Diagnostic("no drive with a port of its own", f'bus "{bus}"', f"valid: {names}")
 
     def connectable(self, bus: str) -> bool:
@@ -166,7 +166,7 @@ class Floor:
         return [bus for bus in self.wires if any(self._ethernet(bus))]
 
     def _ethernet(self, bus: str) -> Iterator[Unit]:
-        return (each.unit for each in self.drives if each.bus == bus and each.unit.connect is not None)
+        return (drive.unit for drive in self.drives if drive.bus == bus and drive.unit.connect is not None)
 
     def delays(self, bus: str) -> Iterator[float]:
         """Yield the reply delays of a connection to a bus, s, without an end; an equal seed gives equal delays."""
@@ -175,29 +175,29 @@ class Floor:
         while True:
             yield rng.uniform(low, high) if high else 0.0
 
-    def place(self, drive: str, where: str) -> tuple[Placed, World]:
+    def place(self, drive: str, where: str) -> tuple[FloorDrive, World]:
         """Find a drive and the surroundings of its axis; `00.y` names an axis. Raises Diagnostic."""
         bus, _, name = drive.rpartition(":")
         name, _, axis = name.partition(".")
-        found = [each for each in self.drives if each.spec.name == name and bus in ("", each.bus)]
-        if len(found) == 1:
-            return found[0], found[0].world_of(axis, where)
-        if found:
-            names = ", ".join(f"{each.bus}:{name}" for each in found)
+        drives = [each for each in self.drives if each.spec.name == name and bus in ("", each.bus)]
+        if len(drives) == 1:
+            return drives[0], drives[0].world_of(axis, where)
+        if drives:
+            names = ", ".join(f"{each.bus}:{name}" for each in drives)
             raise Diagnostic(f'"{drive}" is on several buses', where, f"valid: {names}")
         names = ", ".join(f"{each.bus}:{each.spec.name}" for each in self.drives)
         raise Diagnostic(f'no drive "{drive}"', where, f"valid: {names}")
 
     def _wire(self, bus: BusSpec, seed: int) -> Wire:
         place = Place(bus.baud, alone=len(bus.drives) == 1)
-        placed = [Placed(bus.name, spec, family_of(spec.personality).build(spec, place)) for spec in bus.drives]
+        placed = [FloorDrive(bus.name, spec, family_of(spec.personality).build(spec, place)) for spec in bus.drives]
         self.drives += placed
-        return Wire([each.unit.port for each in placed], bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
+        return Wire([drive.unit.port for drive in placed], bus.baud, bus.faults, Random(f"{seed} {bus.name}"))
 
     def _retune(self, bus: str) -> None:
         """Let a wire follow its drives if all of them have taken the same other baud rate at power-up."""
         wire = self.wires[bus]
-        bauds = {each.unit.port.baud for each in self.drives if each.bus == bus}
+        bauds = {drive.unit.port.baud for drive in self.drives if drive.bus == bus}
         if 0 not in bauds and len(bauds) == 1 and bauds != {wire.baud}:
             wire.retune(bauds.pop())
 

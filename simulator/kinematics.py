@@ -143,7 +143,7 @@ def ramp(segment: Segment, shape: Shape) -> list[Segment]:
 LINE = Shape()
 
 
-class Pace(NamedTuple):
+class MotionPace(NamedTuple):
     """How a motion changes its speed: initial and highest speed, the rates up and down, the shapes of both ramps."""
 
     vi: float
@@ -196,7 +196,7 @@ class Profile(NamedTuple):
 
     def scaled(self, factor: float) -> Profile:
         """Scale the motion about position 0; a negative factor reverses it."""
-        segments = tuple(each.scaled(factor) for each in self.segments)
+        segments = tuple(segment.scaled(factor) for segment in self.segments)
         return Profile(self.start, self.end, factor * self.origin, factor * self.target, segments)
 
     def direction(self, t: float) -> float:
@@ -228,13 +228,13 @@ class Profile(NamedTuple):
 
     def ahead(self, after: float) -> Sequence[Segment]:
         """Return the segments that are not over; where two meet only the later one."""
-        found, then = [], inf
+        segments, then = [], inf
         for segment in reversed(self.segments):
             if segment.end > after and then > after:
-                found.append(segment)
+                segments.append(segment)
             then = segment.start
-        found.reverse()
-        return found
+        segments.reverse()
+        return segments
 
     def _at(self, t: float) -> Segment | None:
         if t >= self.end:
@@ -295,7 +295,7 @@ def halt(at: float, position: float) -> Profile:
     return Profile(at, at, position, position)
 
 
-def move(at: float, p0: float, v0: float, target: float, pace: Pace) -> Profile:
+def move(at: float, p0: float, v0: float, target: float, pace: MotionPace) -> Profile:
     """Move to a target from any position and velocity: a trapezoid, or a triangle if it is too near for `vm`.
 
     A motor that moves away from the target, or is too fast to stop there, decelerates, stops and comes back; from a
@@ -332,7 +332,7 @@ def move(at: float, p0: float, v0: float, target: float, pace: Pace) -> Profile:
     return path.stop()
 
 
-def slew(at: float, p0: float, v0: float, velocity: float, pace: Pace) -> Profile:
+def slew(at: float, p0: float, v0: float, velocity: float, pace: MotionPace) -> Profile:
     """Change to a signed velocity, up with `a` and down with `d`, and keep it; 0: decelerate to `vi` and stop.
 
     A velocity below `vi` is reached at once, after decelerating to `vi` if the motor was faster. A reversal leads
@@ -402,7 +402,7 @@ def _monotonous(one: Profile, other: Profile, after: float) -> Iterator[tuple[fl
 
 def _stretches(one: Profile, other: Profile, after: float) -> Iterator[tuple[float, float]]:
     """Yield quarters of the stretches between the joints of two profiles; the endless last one in doublings."""
-    ends = (each.end for profile in (one, other) for each in profile.segments)
+    ends = (segment.end for profile in (one, other) for segment in profile.segments)
     begin = after
     for joint in sorted(end for end in ends if after < end < inf):
         for n in range(4):

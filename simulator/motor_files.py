@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
-from multidrop.base.files import LARGEST, split_lines
+from multidrop.base.files import LARGEST_FILE, split_lines
 from multidrop.simulator.cell.drive_keys import read_file
 from multidrop.simulator.cell.spec import DriveSpec, MotorSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted
@@ -15,7 +15,7 @@ from multidrop.simulator.torque import MOTORS
 
 VALID = ", ".join((*MOTORS, "FILE.csv"))
 MOST_ROWS = 1000
-FASTEST, STRONGEST = 1000.0, 10_000.0
+FASTEST_SPEED, STRONGEST = 1000.0, 10_000.0
 """The highest speed and torque of a row."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 """A number of a row; `float` would also take `1_0` and digits of other scripts."""
@@ -27,7 +27,7 @@ def read_motor(table: Table, folder: Folder) -> MotorSpec | None:
     if given is None:
         return None
     if isinstance(given, list):
-        columns = (("rev/s", 0.0, FASTEST), ("N m", 0.0, STRONGEST))
+        columns = (("rev/s", 0.0, FASTEST_SPEED), ("N m", 0.0, STRONGEST))
         return MotorSpec(_checked(table, "motor", table.rows("motor", columns)))
     name = table.text("motor")
     if name in MOTORS:
@@ -40,17 +40,17 @@ def read_motor(table: Table, folder: Folder) -> MotorSpec | None:
 def with_motor(drive: DriveSpec, table: Table, folder: Folder) -> DriveSpec:
     """Give a drive the motor of its table, on each axis. Raises Diagnostic."""
     motor = read_motor(table, folder)
-    worlds = [replace(each, motor=motor) for each in (drive.world, *drive.further)]
-    if motor is None and any(each.friction or each.inertia for each in worlds):
+    worlds = [replace(world, motor=motor) for world in (drive.world, *drive.further)]
+    if motor is None and any(world.friction or world.inertia for world in worlds):
         raise table.wrong("motor", "is missing, and the world has friction or inertia", f"valid: {VALID}")
     return replace(drive, world=worlds[0], further=tuple(worlds[1:]))
 
 
 def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]]:
-    text, head = read_file(name, "motor", table, folder, LARGEST).decode("utf-8-sig", "replace"), ["rev/s", "N m"]
+    text, head = read_file(name, "motor", table, folder, LARGEST_FILE).decode("utf-8-sig", "replace"), ["rev/s", "N m"]
     for number, line in enumerate(split_lines(text), 1):
         text = line.partition("#")[0].strip()
-        fields = [each.strip() for each in text.split(",")]
+        fields = [part.strip() for part in text.split(",")]
         if not text:
             continue
         first, head = fields == head, []
@@ -60,8 +60,8 @@ def _rows(table: Table, folder: Folder, name: str) -> Iterator[tuple[float, ...]
         if len(fields) != 2 or not all(map(_NUMBER.fullmatch, fields)):
             raise table.wrong(where, f"cannot be {quoted(text)}", "valid: rev/s, N m, as in 5, 0.38")
         speed, torque = map(float, fields)
-        if not (0 <= speed <= FASTEST and 0 <= torque <= STRONGEST):
-            hint = f"valid: 0 to {FASTEST:g} rev/s, 0 to {STRONGEST:g} N m"
+        if not (0 <= speed <= FASTEST_SPEED and 0 <= torque <= STRONGEST):
+            hint = f"valid: 0 to {FASTEST_SPEED:g} rev/s, 0 to {STRONGEST:g} N m"
             raise table.wrong(where, f"is out of range: {quoted(text)}", hint)
         yield speed, torque
 

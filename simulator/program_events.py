@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from multidrop.base.errors import Diagnostic
 
 
-class Line(NamedTuple):
+class ReportLine(NamedTuple):
     """A line for a person. `problem`: it belongs on standard error."""
 
     text: str
@@ -18,7 +18,7 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Debugging:
+class DebugWishes:
     """Wishes of a person who debugs a program.
 
     `trace`: report every executed line; otherwise only those that change a watched value. `breaks` are `LINE`, `LABEL`,
@@ -35,11 +35,11 @@ class Debugging:
         return bool(self.trace or self.breaks or self.watch)
 
 
-NO_DEBUGGING = Debugging()
+NO_DEBUGGING = DebugWishes()
 
 
 @dataclass(frozen=True)
-class Event:
+class ProgramEvent:
     """Something that a run reports at a time, s: its facts, and a line for a person. The last event is the Summary.
 
     `line`: that of the file which it is about. `problem`: it belongs on standard error, where the file is named first.
@@ -59,10 +59,10 @@ class Event:
         """Return the JSON object; `real` is how many seconds the run has taken."""
         return {"t": round(self.t, 6), **self.facts}
 
-    def lines(self, file: str, real: float) -> Iterator[Line]:
+    def lines(self, file: str, real: float) -> Iterator[ReportLine]:
         place = f"{file}: " if self.problem else ""
         place = place if self.line is None else f"{file}:{self.line}: "
-        yield Line(f"{'' if self.problem else f'{self.t:10.4f}  '}{place}{self.text}", self.problem)
+        yield ReportLine(f"{'' if self.problem else f'{self.t:10.4f}  '}{place}{self.text}", self.problem)
 
 
 ENDS = {
@@ -75,7 +75,7 @@ ENDS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Summary(Event):
+class Summary(ProgramEvent):
     """How a run ended: "E", "END", "error", "break" or "until"; position, motions begun, lines executed, errors.
 
     `errors` are those that the program has not handled. `lines_at` are the lines of the file at which a program stands
@@ -114,9 +114,9 @@ class Summary(Event):
             }
         }
 
-    def lines(self, file: str, real: float) -> Iterator[Line]:
+    def lines(self, file: str, real: float) -> Iterator[ReportLine]:
         how = f"{ENDS[self.ended]} after {self.t:.4f} s" if self.ran else "not run"
-        yield Line(f"{how}: {self.counts} ({real:.2f} s real)")
+        yield ReportLine(f"{how}: {self.counts} ({real:.2f} s real)")
         remark = self.turning
         if self.stuck:
             remark = "the program waits here for ever: no further event is possible"
@@ -124,11 +124,11 @@ class Summary(Event):
             remark = "the program still runs; --until SECONDS sets the time limit"
         for line in self.lines_at or (0,):
             if remark:
-                yield Line(f"{file}:{line}: {remark}" if line else f"{file}: {remark}", problem=True)
+                yield ReportLine(f"{file}:{line}: {remark}" if line else f"{file}: {remark}", problem=True)
 
 
-# The trace of a program file's run: a family names the next line of the file and its variables; `Recorder` makes events
-# of that, `MOST_TRACED` at most.
+# The trace of a program file's run: a family names the next line of the file and its variables; `RunRecorder` makes
+# events of that, `MOST_TRACED` at most.
 
 MOST_TRACED = 10_000
 """Traced lines after which a trace ends."""
@@ -139,26 +139,26 @@ Values = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
-class Broken(Event):
+class Broken(ProgramEvent):
     """The end of a run before the line of a break point: its place as given, and the lines of the file."""
 
     place: str = ""
     source: Sequence[str] = field(default=(), repr=False)
 
-    def lines(self, file: str, real: float) -> Iterator[Line]:
+    def lines(self, file: str, real: float) -> Iterator[ReportLine]:
         assert self.line is not None
-        yield Line(f"{self.t:10.4f}  break point {self.place}: {file}:{self.line}: {self.text}")
+        yield ReportLine(f"{self.t:10.4f}  break point {self.place}: {file}:{self.line}: {self.text}")
         first, last = max(self.line - AROUND, 1), min(self.line + AROUND, len(self.source))
         width = len(str(last))
         for n in range(first, last + 1):
-            yield Line(f"{'->' if n == self.line else '  '} {n:{width}}  {self.source[n - 1]}".rstrip())
+            yield ReportLine(f"{'->' if n == self.line else '  '} {n:{width}}  {self.source[n - 1]}".rstrip())
 
 
-def _trace_full(t: float) -> Event:
+def _trace_full(t: float) -> ProgramEvent:
     """The end of a trace that has become too long. The run goes on."""
     ends = f"ends after {MOST_TRACED} lines"
     hint = "--until and --break end the run earlier, --watch shows fewer lines"
-    return Event(t, {"trace": ends}, f"the trace {ends}; {hint}", problem=True)
+    return ProgramEvent(t, {"trace": ends}, f"the trace {ends}; {hint}", problem=True)
 
 
 def shown(values: Values) -> str:
@@ -183,7 +183,7 @@ def break_point(text: str, file: str, valid: str) -> BreakPoint:
     return BreakPoint(text, place.strip(), int(number) if comma else 1)
 
 
-class Recorder:
+class RunRecorder:
     """Makes events of the lines of one run. `values` reads what is watched, `points` are by line of the file.
 
     `shown` makes the text of an event from a line of the file. `broken`: a break point has ended the run.
@@ -191,7 +191,7 @@ class Recorder:
 
     def __init__(
         self,
-        debugging: Debugging,
+        debugging: DebugWishes,
         source: Sequence[str],
         points: Mapping[int, BreakPoint],
         values: Callable[[], Values],
@@ -202,7 +202,7 @@ class Recorder:
         self._debugging, self._source, self._points, self._values = debugging, source, points, values
         self._last = dict(values())
         self._traced = 0
-        self._events: list[Event] = []
+        self._events: list[ProgramEvent] = []
 
     @property
     def full(self) -> bool:
@@ -238,11 +238,11 @@ class Recorder:
             self._traced += 1
             self._events.append(_trace_full(t) if self.full else self._executed(t, line, changed, program))
 
-    def _executed(self, t: float, line: int, changed: Values, program: int | None) -> Event:
+    def _executed(self, t: float, line: int, changed: Values, program: int | None) -> ProgramEvent:
         text, number = self._text(line), {} if program is None else {"program": program}
         facts = {**number, "line": line, "text": text, "changed": dict(changed)}
         of = "" if program is None else f" (program {program})"
-        return Event(t, facts, f"{text}{of}{shown(changed)}", line)
+        return ProgramEvent(t, facts, f"{text}{of}{shown(changed)}", line)
 
     def _text(self, line: int) -> str:
         return self._shown(self._source[line - 1]) if 0 < line <= len(self._source) else ""
@@ -256,6 +256,6 @@ class Recorder:
         self._last = dict(now)
         return changed
 
-    def take(self) -> list[Event]:
+    def take(self) -> list[ProgramEvent]:
         taken, self._events = self._events, []
         return taken

@@ -17,24 +17,24 @@ from multidrop.simulator.declared import simulated
 from multidrop.simulator.program_events import (
     NO_DEBUGGING,
     BreakPoint,
-    Debugging,
-    Event,
-    Recorder,
+    DebugWishes,
+    ProgramEvent,
+    RunRecorder,
     Summary,
     Value,
     Values,
     break_point,
 )
 
-LONGEST = 3600.0
+LONGEST_RUN = 3600.0
 """Virtual seconds after which a run without a time of its own is given up."""
 MOST_LINES = 20_000_000
 """Executed lines after which it is given up as well: a program that never waits, on a drive set up to be fast."""
-SLICE = 1.0
+RUN_SLICE = 1.0
 """Virtual seconds between two looks at what the drive has done: some thousand lines."""
 
 
-class Running(Protocol):
+class RunningProgram(Protocol):
     """A program that runs on a simulated drive: how many lines it has carried out."""
 
     executed: int
@@ -43,29 +43,31 @@ class Running(Protocol):
     def running(self) -> bool: ...  # noqa: D102
 
 
-def looks(program: Running, deadline: Callable[[], float | None], until: float | None) -> Iterator[tuple[float, bool]]:
-    """Yield the times up to which a run advances at once, while its program runs: `SLICE` beyond the next event.
+def looks(
+    program: RunningProgram, deadline: Callable[[], float | None], until: float | None
+) -> Iterator[tuple[float, bool]]:
+    """Yield the times up to which a run advances at once, while its program runs: `RUN_SLICE` beyond the next event.
 
     The second value: nothing would ever happen any more.
     """
-    now, limit, most = 0.0, LONGEST if until is None else until, MOST_LINES if until is None else inf
+    now, limit, most = 0.0, LONGEST_RUN if until is None else until, MOST_LINES if until is None else inf
     while program.running and now < limit and program.executed < most:
         due = deadline()
-        now = limit if due is None else min(max(due, now) + SLICE, limit)
+        now = limit if due is None else min(max(due, now) + RUN_SLICE, limit)
         yield now, due is None
 
 
 # The run of a file: what a family need not say of its own.
 
 Reader = Callable[[], Value]
-Kind = TypeVar("Kind", bound=Recorder)
+Kind = TypeVar("Kind", bound=RunRecorder)
 
 
 class ProgramRun(ABC):
     """A program file on a simulated drive, run in virtual time: no clock, no wire, no event loop.
 
     The class stands for the program files of a family; an instance is one file on one drive. The drive's time goes from
-    event to event, so that ten minutes of holding cost nothing, and up to `SLICE` further, so that a line of the
+    event to event, so that ten minutes of holding cost nothing, and up to `RUN_SLICE` further, so that a line of the
     program costs little. The run ends with the program, when nothing can ever happen any more, or when its time is
     over.
     """
@@ -87,7 +89,7 @@ class ProgramRun(ABC):
     complete: ClassVar[str]
     """How a run ends with its program: a key of `ENDS`."""
 
-    running: Running
+    running: RunningProgram
     """What runs in the drive."""
 
     def __init__(self, spec: DriveSpec, file: str, source: Sequence[str]) -> None:
@@ -96,8 +98,8 @@ class ProgramRun(ABC):
         if spec.personality not in valid:
             raise Diagnostic(f"a {spec.personality} does not run {self.title}", file, f"valid: {', '.join(valid)}")
         self.file, self.source = file, source
-        self.recorder: Recorder | None = None
-        self.events: list[Event] = []
+        self.recorder: RunRecorder | None = None
+        self.events: list[ProgramEvent] = []
         self.errors: list[int | str] = []
         self.now, self._stuck = 0.0, False
 
@@ -121,7 +123,9 @@ class ProgramRun(ABC):
 
     # The run
 
-    def run(self, start: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
+    def run(
+        self, start: str = "", until: float | None = None, debugging: DebugWishes = NO_DEBUGGING
+    ) -> Iterator[ProgramEvent]:
         """Run it from `start`, for `until` virtual seconds at most; the last event is a Summary.
 
         A file with a refused line is not run. Raises Diagnostic if there is nothing to run.
@@ -141,12 +145,12 @@ class ProgramRun(ABC):
         ended = "until" if self.running.running else "break" if self.broken else self.ended()
         yield self.summary(ended, until)
 
-    def load(self) -> Iterator[Event]:
+    def load(self) -> Iterator[ProgramEvent]:
         """Load what is not loaded yet; `errors` gets what the drive refuses."""
         yield from ()
 
     @abstractmethod
-    def begin(self, start: str, debugging: Debugging) -> None:
+    def begin(self, start: str, debugging: DebugWishes) -> None:
         """Start what is to run, and record it where that is wanted. Raises Diagnostic if there is nothing to run."""
 
     @abstractmethod
@@ -157,7 +161,7 @@ class ProgramRun(ABC):
     def advance(self) -> None:
         """Let the drive come to `now`."""
 
-    def news(self) -> list[Event]:
+    def news(self) -> list[ProgramEvent]:
         """What was executed and what happened since the last look, in the order of time."""
         news, self.events = self.events, []
         if self.recorder is not None:
@@ -167,14 +171,14 @@ class ProgramRun(ABC):
         return news
 
     @abstractmethod
-    def happened(self) -> Iterator[Event]:
+    def happened(self) -> Iterator[ProgramEvent]:
         """What went wrong in the drive since the last look, and what else it tells only then."""
 
     @staticmethod
-    def order(event: Event) -> Any:
+    def order(event: ProgramEvent) -> Any:
         return event.t
 
-    def rest(self) -> Iterator[Event]:
+    def rest(self) -> Iterator[ProgramEvent]:
         """What is told when the run is over."""
         yield from ()
 
@@ -188,17 +192,17 @@ class ProgramRun(ABC):
 
     # The trace, and break points
 
-    def recording(self, debugging: Debugging, kind: Callable[..., Kind]) -> Kind:
+    def recording(self, debugging: DebugWishes, kind: Callable[..., Kind]) -> Kind:
         """Look at the lines that a person follows. Raises Diagnostic for a place or a name that is not there."""
         readers = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
-        points = {self.line_of(at := break_point(each, self.file, self.breaks)): at for each in debugging.breaks}
+        points = {self.line_of(at := break_point(place, self.file, self.breaks)): at for place in debugging.breaks}
         values = partial(self.values, readers) if readers else partial(self.unnamed, debugging.trace)
         return kind(debugging, self.source, points, values, self.shown)
 
     def _reader(self, name: str) -> Reader:
-        if (found := self.reader(name)) is None:
+        if (read := self.reader(name)) is None:
             raise Diagnostic(f"no variable {name} to watch", self.file, f"valid: {self.watches}")
-        return found
+        return read
 
     @abstractmethod
     def reader(self, name: str) -> Reader | None:

@@ -3,9 +3,9 @@
 A motor has a curve of torque by speed at full current; the current scales it. A turn takes `load` (a part of the torque
 at rest and full current, against every turn), `friction` for each rev/s and `inertia`, that of the rotor included, for
 the acceleration. Along a segment of constant acceleration all of these are straight lines between the rows of the
-curve, so the time at which a motion asks for too much is a formula; an S-curve is divided into `PARTS`. The jump to the
-initial velocity asks for nothing. A rotor that turns lags its field by an angle whose sine is the part of the torque
-that it needs: a full step at most, with all of it.
+curve, so the time at which a motion asks for too much is a formula; an S-curve is divided into `CURVE_PARTS`. The jump
+to the initial velocity asks for nothing. A rotor that turns lags its field by an angle whose sine is the part of the
+torque that it needs: a full step at most, with all of it.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ MOTORS: Mapping[str, MotorSpec] = MappingProxyType(
 )
 """Figures of our own for a common motor of each size on 48 V; none is measured."""
 FULL_STEPS = 200
-PARTS = 16
-LATE = 1e-9
+CURVE_PARTS = 16
+TOLERANCE = 1e-9
 """Seconds, and parts of a torque or a speed, that are rounding."""
 
 
@@ -49,7 +49,7 @@ class Torque:
         curve = self._curve
         n = bisect_right(curve, speed, key=lambda row: row[0])
         if n == len(curve):
-            return curve[-1][1] if speed <= curve[-1][0] * (1 + LATE) else 0.0
+            return curve[-1][1] if speed <= curve[-1][0] * (1 + TOLERANCE) else 0.0
         (low, least), (high, most) = curve[n - 1], curve[n]
         return least + (most - least) * (speed - low) / (high - low)
 
@@ -68,14 +68,14 @@ class Torque:
             return inf
         for segment in profile.ahead(after):
             rows = self._balance(segment, max(after, segment.start), share, turn)
-            found = [t for t, there, needed in rows[:1] if abs(needed) > there * (1 + LATE)]
+            times = [t for t, there, needed in rows[:1] if abs(needed) > there * (1 + TOLERANCE)]
             for (low, first, was), (high, last, needed) in pairwise(rows):
                 for sign in (1, -1):  # driving and braking
                     before, behind = first - sign * was, last - sign * needed
-                    if behind < -LATE * last:
-                        found.append(low if before <= 0 else low + (high - low) * before / (before - behind))
-            if found:
-                return min(found)
+                    if behind < -TOLERANCE * last:
+                        times.append(low if before <= 0 else low + (high - low) * before / (before - behind))
+            if times:
+                return min(times)
         return inf
 
     def used(self, profile: Profile, t: float, share: float, turn: float) -> float:
@@ -89,7 +89,7 @@ class Torque:
 
     def most_used(self, profile: Profile, share: float, turn: float) -> float:
         """The largest part of the torque that a motion needs; infinite where there is none."""
-        rows = [row for each in profile.segments for row in self._balance(each, each.start, share, turn)]
+        rows = [row for segment in profile.segments for row in self._balance(segment, segment.start, share, turn)]
         return max((abs(needed) / there if there else inf for _, there, needed in rows), default=0.0)
 
     def lag(self, profile: Profile, t: float, share: float, turn: float) -> float:
@@ -111,7 +111,7 @@ class Torque:
             return
         yield segment.end
         if segment.gain:
-            yield from (begin + (segment.end - begin) * n / PARTS for n in range(1, PARTS))
+            yield from (begin + (segment.end - begin) * n / CURVE_PARTS for n in range(1, CURVE_PARTS))
         elif segment.acceleration:
             for speed, _ in self._curve:
                 t = segment.start + (speed * turn * segment.direction - segment.velocity) / segment.acceleration

@@ -167,7 +167,7 @@ def resample(data: bytes, sent: float, received: float) -> bytes:
             at += 1
             continue
         middles = (int(at + (bit + 1.5) * ratio) for bit in range(8))
-        bits = [levels[each] if each < len(levels) else 1 for each in middles]  # idle after the last byte
+        bits = [levels[middle] if middle < len(levels) else 1 for middle in middles]  # idle after the last byte
         out.append(sum(level << bit for bit, level in enumerate(bits)))
         at = max(at + 1, ceil(at + 9.5 * ratio))
     return bytes(out)
@@ -341,8 +341,8 @@ class Wire:
 
     def retract(self, now: float, source: int = 0) -> int:
         """Drop what a source has written and what has not begun to go out by `now`; return the number of bytes."""
-        kept = [each for each in self._coming if each[2] != source or each[0] - self._byte_time < now]
-        dropped = sum(len(each[1]) for each in self._coming) - sum(len(each[1]) for each in kept)
+        kept = [byte for byte in self._coming if byte[2] != source or byte[0] - self._byte_time < now]
+        dropped = sum(len(byte[1]) for byte in self._coming) - sum(len(byte[1]) for byte in kept)
         self._coming = deque(kept)
         self._count(source, -dropped)
         return dropped

@@ -12,7 +12,7 @@ from math import copysign, inf, nextafter
 
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.kinematics import Profile, halt
-from multidrop.simulator.torque import LATE, Torque
+from multidrop.simulator.torque import TOLERANCE, Torque
 
 REVOLUTION = 51200.0
 """Motor steps of a turn: 200 full steps of 256 microsteps."""
@@ -109,7 +109,7 @@ class World:
 
     def _find_edges(self) -> tuple[float, ...]:
         edges = (*(self.home or ()), self.limit_plus, self.limit_minus)
-        return tuple(each for each in edges if each is not None and abs(each) < inf)
+        return tuple(edge for edge in edges if edge is not None and abs(edge) < inf)
 
     def hold(self, held: bool) -> None:
         self._held = held
@@ -214,7 +214,7 @@ class Shaft:
             place = wall
         if self._stalled and (not command.moving(t) or command.direction(t) != self._stalled):
             self._stalled = 0.0
-        elif self.factor and not self._stalled and self._fails_at(t) <= t + LATE:
+        elif self.factor and not self._stalled and self._fails_at(t) <= t + TOLERANCE:
             self._stalled = command.direction(t)
         factor = self._coupling(place, t)
         if factor != self.factor or self.world.pushed != self._pushed:

@@ -9,7 +9,7 @@ from struct import pack
 from typing import Any, Protocol
 
 from multidrop.families.lexium.manual.modbus.registers import REGISTERS
-from multidrop.families.tmcl.manual.commands import Call, Status
+from multidrop.families.tmcl.manual.commands import Status, TmclCall
 
 VALUES = (60_000_000, 100_000_000)
 TICKS = 50_000_000
@@ -188,7 +188,7 @@ class TmclLanguage:
         """A random command."""
         value, choice = rng.randrange(1_000_000, 8_000_000), rng.random()
         if choice < 0.4:
-            witness.unwatched(Call(SAP, 195, 0, value), now)
+            witness.unwatched(TmclCall(SAP, 195, 0, value), now)
             return Said("GAP 195, 0", f"{value}")
         return Said(f"SAP 194, 0, {value}") if choice < 0.8 else Said(f"MVP ABS, 0, {value}")
 

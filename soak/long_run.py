@@ -20,7 +20,7 @@ from typing import Any
 
 from multidrop.drives.events import Sample
 from multidrop.macros import Macro
-from multidrop.macros.model import Step
+from multidrop.macros.model import MacroStep
 from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Failed, OnBus
@@ -101,7 +101,7 @@ class LongRun:
         for number in range(10**9):
             at = f"tab{2 * number % TABS}:a"
             lines = [line if line.startswith("/") else f"@{at} {line}" for line in MACRO]
-            await play(self.session, PERSON, Macro("soak", tuple(Step(0.1, line) for line in lines)), {})
+            await play(self.session, PERSON, Macro("soak", tuple(MacroStep(0.1, line) for line in lines)), {})
             self.played += 1
 
     def _figures(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Protocol
 from multidrop.base.errors import TransportLost
 
 
-class Endpoint(Protocol):
+class Descriptor(Protocol):
     """A descriptor that never blocks: `read` and `write` raise BlockingIOError instead."""
 
     @property

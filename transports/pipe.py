@@ -23,7 +23,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from multidrop.base.errors import TransportLost
-from multidrop.transports import Endpoint, Lost, PortControl, Received, Transport
+from multidrop.transports import Descriptor, Lost, PortControl, Received, Transport
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""
@@ -160,11 +160,11 @@ _READS = 64
 
 
 class DescriptorPipe(Pipe):
-    """A transport over an `Endpoint`. Each `write` is first offered to the endpoint as a whole."""
+    """A transport over an `Descriptor`. Each `write` is first offered to the endpoint as a whole."""
 
     preemptible = True
 
-    def __init__(self, endpoint: Endpoint, control: PortControl | None = None) -> None:
+    def __init__(self, endpoint: Descriptor, control: PortControl | None = None) -> None:
         super().__init__(endpoint.name, control)
         self._endpoint = endpoint
         self._pending: deque[memoryview] = deque()

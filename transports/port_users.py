@@ -102,8 +102,8 @@ def lock_owner(port: str) -> User | None:
 
 def in_use(port: str) -> str:
     """Say who has a port that could not be opened, and what to do."""
-    if (found := holder(port)) is not None:
-        return f"{found}; {found.remedy(port)}"
+    if (user := holder(port)) is not None:
+        return f"{user}; {user.remedy(port)}"
     if maybe := suspects(port):
         return f"another program, perhaps {maybe}"
     tool = {"linux": "fuser -v", "darwin": "lsof"}.get(sys.platform)
@@ -112,21 +112,21 @@ def in_use(port: str) -> str:
 
 def beside(port: str) -> str:
     """Say which program has an open port as well, and what to do; empty: none is known."""
-    found = other(port)
-    if found is None:
+    user = other(port)
+    if user is None:
         return ""
-    return f"{found} has {port} open as well, and each takes bytes from the other; {found.remedy(port)}"
+    return f"{user} has {port} open as well, and each takes bytes from the other; {user.remedy(port)}"
 
 
 def suspects(port: str, root: Path = ROOT) -> str:
     """Name the services that may have a port open, where this account may not know, each with its remedy."""
-    found = []
+    users = []
     for process in _processes(root):
         user = _program(process.name, root)
         known = user.name in SERVICES and not os.path.realpath(port).startswith(TERMINALS)
         if (known or user.name in LOGINS and _names(process, port)) and _hidden(process):
-            found.append(f"{user}: {user.remedy(port)}")
-    return "; or ".join(found)
+            users.append(f"{user}: {user.remedy(port)}")
+    return "; or ".join(users)
 
 
 def taker(root: Path = ROOT) -> str:
@@ -139,7 +139,7 @@ def taker(root: Path = ROOT) -> str:
 
 def _processes(root: Path) -> Iterator[Path]:
     with contextlib.suppress(OSError):
-        yield from sorted(each for each in (root / "proc").iterdir() if each.name.isdigit())
+        yield from sorted(process for process in (root / "proc").iterdir() if process.name.isdigit())
 
 
 def _hidden(process: Path) -> bool:
@@ -173,11 +173,11 @@ def _with_lock_file(port: str, root: Path) -> User | None:
     for folder in ("run/lock", "var/lock", "var/lock/lockdev"):
         for name in names:
             try:
-                found = re.search(r"\d+", (root / folder / name).read_text(encoding="latin-1"))
+                match = re.search(r"\d+", (root / folder / name).read_text(encoding="latin-1"))
             except OSError:
                 continue
-            if found and int(found[0]) != os.getpid() and (root / "proc" / found[0]).is_dir():
-                return _program(found[0], root)
+            if match and int(match[0]) != os.getpid() and (root / "proc" / match[0]).is_dir():
+                return _program(match[0], root)
     return None
 
 

@@ -34,7 +34,7 @@ VERSION = 1
 GREETING = f"{WORD} {VERSION}"
 CREDIT = 256
 """The largest number of bytes that were sent and that the far port has not reported as sent."""
-MOST = 4096
+MOST_FRAME_BYTES = 4096
 """The longest payload, bytes."""
 BEAT = 1.5
 """The pause between two signs of life of this side, s; the far side replies to each."""
@@ -44,7 +44,7 @@ SILENCE = 6.0
 """Without a byte from this side for that long, s, the far side ends: a cut network must not keep the port locked.
 
 By then this side has given up. What it sent before must not be executed later."""
-HEAD = 3
+HEAD_BYTES = 3
 """The bytes of a frame before its payload."""
 
 
@@ -60,14 +60,14 @@ class Kind(IntEnum):
     BEAT = ord("P")
     """A sign of life, and the reply to it."""
     SET = ord("S")
-    """To the far side: change a setting of the port (number, `Setting`, 4 bytes value)."""
+    """To the far side: change a setting of the port (number, `PortSetting`, 4 bytes value)."""
     OUTCOME = ord("O")
     """To this side: the outcome of a change (number, text; no text: it is done)."""
     LOST = ord("L")
     """To this side: the port is lost (text)."""
 
 
-class Setting(IntEnum):
+class PortSetting(IntEnum):
     """The settings of a port that change while it is open."""
 
     BAUD = 1
@@ -76,7 +76,7 @@ class Setting(IntEnum):
     BREAK = 4
 
 
-class Garbled(Exception):
+class GarbledFrame(Exception):
     """Bytes that are not a frame."""
 
 
@@ -84,7 +84,7 @@ def frame(kind: Kind, payload: bytes | memoryview = b"") -> bytes:
     return bytes([kind]) + len(payload).to_bytes(2) + payload
 
 
-class Frames:
+class FrameSplitter:
     """Divides the bytes that arrive into frames."""
 
     def __init__(self) -> None:
@@ -93,14 +93,14 @@ class Frames:
     def take(self, data: bytes) -> Iterator[tuple[Kind, bytes]]:
         """Take bytes in, and return the frames that are whole by now. Raises Garbled at the first wrong byte."""
         self._held += data
-        while len(self._held) >= HEAD:
-            kind, size = self._held[0], int.from_bytes(self._held[1:HEAD])
-            if kind not in _KINDS or size > MOST:
-                raise Garbled(f"{bytes(self._held[:HEAD]).hex(' ')} is not the beginning of a frame")
-            if len(self._held) < HEAD + size:
+        while len(self._held) >= HEAD_BYTES:
+            kind, size = self._held[0], int.from_bytes(self._held[1:HEAD_BYTES])
+            if kind not in _KINDS or size > MOST_FRAME_BYTES:
+                raise GarbledFrame(f"{bytes(self._held[:HEAD_BYTES]).hex(' ')} is not the beginning of a frame")
+            if len(self._held) < HEAD_BYTES + size:
                 return
-            payload = bytes(self._held[HEAD : HEAD + size])
-            del self._held[: HEAD + size]
+            payload = bytes(self._held[HEAD_BYTES : HEAD_BYTES + size])
+            del self._held[: HEAD_BYTES + size]
             yield Kind(kind), payload
 
 
@@ -109,7 +109,7 @@ _KINDS = frozenset(map(int, Kind))
 
 assert sys.platform != "win32"
 
-_READ = 65536
+_READ_BYTES = 65536
 _FULL = 65536
 """Bytes that wait for a slow reader, from which on the port is not read."""
 _LINGER = 1.0
@@ -127,7 +127,7 @@ class Relay:
         """What the reader has not taken yet."""
         self.queue = bytearray()
         """What the port has not taken yet."""
-        self._frames = Frames()
+        self._frames = FrameSplitter()
         self._settled = self._reported = 0
         """Bytes for the port since the beginning: dropped or taken by the driver; reported as sent."""
 
@@ -142,12 +142,12 @@ class Relay:
                 self.out += frame(Kind.BEAT)
             elif kind is Kind.SET:
                 if len(payload) != 6:
-                    raise Garbled("a change of a setting that is not 6 bytes long")
+                    raise GarbledFrame("a change of a setting that is not 6 bytes long")
                 self.out += frame(
                     Kind.OUTCOME, payload[:1] + _changed(self.port.control, payload[1], payload[2:]).encode()
                 )
             else:
-                raise Garbled(f"a frame {kind.name}, which only the far side sends")
+                raise GarbledFrame(f"a frame {kind.name}, which only the far side sends")
         self.push()
 
     def late(self, data: bytes) -> None:
@@ -195,7 +195,9 @@ class Relay:
             return True
         if data is None:
             return False
-        self.out += b"".join(frame(Kind.DATA, data[at : at + MOST]) for at in range(0, len(data), MOST))
+        self.out += b"".join(
+            frame(Kind.DATA, data[at : at + MOST_FRAME_BYTES]) for at in range(0, len(data), MOST_FRAME_BYTES)
+        )
         return True
 
     def lost(self, error: OSError | None) -> str:
@@ -214,10 +216,10 @@ def _changed(control: PortControl, setting: int, value: bytes) -> str:
     """Change a setting; return the reason why it is refused, or an empty text."""
     number = int.from_bytes(value)
     changes: dict[int, Callable[[], None]] = {
-        Setting.BAUD: lambda: control.set_baud(number),
-        Setting.DTR: lambda: control.set_dtr(bool(number)),
-        Setting.RTS: lambda: control.set_rts(bool(number)),
-        Setting.BREAK: lambda: control.set_break(bool(number)),
+        PortSetting.BAUD: lambda: control.set_baud(number),
+        PortSetting.DTR: lambda: control.set_dtr(bool(number)),
+        PortSetting.RTS: lambda: control.set_rts(bool(number)),
+        PortSetting.BREAK: lambda: control.set_break(bool(number)),
     }
     if setting not in changes:
         return f"no setting {setting}"
@@ -262,7 +264,7 @@ class _Loop:
         try:
             while self._turn():
                 pass
-        except Garbled as problem:
+        except GarbledFrame as problem:
             raise TransportLost(f"standard input is not from multidrop: {problem}") from None
         finally:
             self._linger()
@@ -296,7 +298,7 @@ class _Loop:
         """Take in what arrived from the other end; False where that is gone."""
         self._last = _now()
         try:
-            data = os.read(self._source, _READ)
+            data = os.read(self._source, _READ_BYTES)
         except (BlockingIOError, InterruptedError):
             return True
         except OSError:

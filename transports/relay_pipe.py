@@ -15,9 +15,20 @@ from collections.abc import Callable
 
 from multidrop.transports import PortControl
 from multidrop.transports.pipe import DescriptorPipe, begun
-from multidrop.transports.relay import BEAT, CREDIT, HEAD, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
+from multidrop.transports.relay import (
+    BEAT,
+    CREDIT,
+    HEAD_BYTES,
+    MISSED,
+    MOST_FRAME_BYTES,
+    FrameSplitter,
+    GarbledFrame,
+    Kind,
+    PortSetting,
+    frame,
+)
 
-_READ = 4096
+_READ_BYTES = 4096
 _WAITED = 64 * 1024
 _PATIENCE = 5.0
 """Seconds to wait for the outcome of a change of a setting."""
@@ -71,7 +82,7 @@ class RelayEndpoint:
         self.news = threading.Condition()
         """Notified at an outcome, and at the end."""
         self._connection = connection
-        self._frames = Frames()
+        self._frames = FrameSplitter()
         self._early = early
         self._rest: deque[memoryview] = deque()
         """Frames, and the rest of one, that the system has not taken."""
@@ -100,7 +111,7 @@ class RelayEndpoint:
 
     def read(self) -> bytes | None:
         """Bytes from the port; empty: other news; None: the end."""
-        data = self._early or self._connection.read(_READ)
+        data = self._early or self._connection.read(_READ_BYTES)
         self._early = b""
         if not data:
             return None
@@ -108,7 +119,7 @@ class RelayEndpoint:
         try:
             for kind, payload in self._frames.take(data):
                 self._obey(kind, payload, arrived)
-        except Garbled as problem:
+        except GarbledFrame as problem:
             self._reason = f"the other end sends what is not of a relay ({problem})"
             raise OSError(self._reason) from problem
         return bytes(arrived)
@@ -136,8 +147,8 @@ class RelayEndpoint:
         if self._rest or allowed <= 0:
             raise BlockingIOError
         self._urgent = False
-        for at in range(0, allowed, MOST):
-            self._rest.append(memoryview(frame(Kind.DATA, data[at : min(at + MOST, allowed)])))
+        for at in range(0, allowed, MOST_FRAME_BYTES):
+            self._rest.append(memoryview(frame(Kind.DATA, data[at : min(at + MOST_FRAME_BYTES, allowed)])))
         self._sent += allowed
         self.flush()
         return allowed
@@ -167,11 +178,11 @@ class RelayEndpoint:
         """
         held = self.unsent()
         leaves = deque[memoryview]()
-        for each in self._rest:
-            if each[0] == Kind.DATA and not begun(each):
-                self._sent -= len(each) - HEAD
+        for piece in self._rest:
+            if piece[0] == Kind.DATA and not begun(piece):
+                self._sent -= len(piece) - HEAD_BYTES
             else:
-                leaves.append(each)
+                leaves.append(piece)
         self._rest = leaves
         self._base, self._urgent = self._sent, True
         self._rest.append(memoryview(frame(Kind.DROP)))
@@ -304,13 +315,13 @@ class RelayControl(PortControl):
         self._number = 0
 
     def set_baud(self, baud: int) -> None:
-        self._set(Setting.BAUD, baud)
+        self._set(PortSetting.BAUD, baud)
         self.baud = baud
 
     def _switch(self, line: str, on: bool) -> None:
-        self._set(Setting[line.upper()], on)
+        self._set(PortSetting[line.upper()], on)
 
-    def _set(self, setting: Setting, value: int) -> None:
+    def _set(self, setting: PortSetting, value: int) -> None:
         with self._turn:
             self._number = (self._number + 1) % 256
             self._relay.outcomes.pop(self._number, None)

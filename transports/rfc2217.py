@@ -106,15 +106,16 @@ class Rfc2217Pipe(Transport):
             ) from None
         self._check()
         needed = {
-            telnet.NAMES[each]: (int(each), value) for each, value in {Setting.BAUD: baud, **telnet.NEEDED}.items()
+            telnet.NAMES[setting]: (int(setting), value)
+            for setting, value in {Setting.BAUD: baud, **telnet.NEEDED}.items()
         }
-        answers = {what: self._ask(what, *each) for what, each in (needed | _WISHES).items()}
+        answers = {what: self._ask(what, *setting) for what, setting in (needed | _WISHES).items()}
         await self._settled(answers[what] for what in needed)
         wrong = [what for what, (_, value) in needed.items() if _answer(answers[what]) != value]
         if wrong:
             rate = telnet.NAMES[Setting.BAUD]
-            kept = f" (it has {found})" if rate in wrong and (found := _answer(answers[rate])) else ""
-            named = ", ".join(f"{each} {baud}{kept}" if each == rate else each for each in wrong)
+            kept = f" (it has {rate_taken})" if rate in wrong and (rate_taken := _answer(answers[rate])) else ""
+            named = ", ".join(f"{refusal} {baud}{kept}" if refusal == rate else refusal for refusal in wrong)
             raise self._refused(f"the server does not accept {named}; check the settings of its port")
         self.control.baud = baud
         await self._settled((answers[what] for what in _WISHES), GRACE)
@@ -149,9 +150,9 @@ class Rfc2217Pipe(Transport):
             raise OSError(str(self._loss))
         answer = self._ask(what, setting, value)
         await asyncio.wait([answer], timeout=CONFIRM)
-        if (found := _answer(answer)) is None:
+        if (accepted := _answer(answer)) is None:
             raise OSError(f"the server does not confirm {what}")
-        return found
+        return accepted
 
     # Receiving
 
@@ -170,18 +171,18 @@ class Rfc2217Pipe(Transport):
                     self._agreed.set()
                 elif event.verb in telnet.REFUSAL and event.option not in _OFFERED:
                     self._inner.write(telnet.option(telnet.REFUSAL[event.verb], event.option))
-            elif isinstance(event, telnet.Subnegotiation) and (found := telnet.parsed(event.body)):
-                self._confirmed(*found)
+            elif isinstance(event, telnet.Subnegotiation) and (setting := telnet.parsed(event.body)):
+                self._confirmed(*setting)
 
     def _confirmed(self, number: int, value: bytes) -> None:
         setting = number - telnet.REPLY
         if setting == Setting.SIGNATURE:
             self._farewell = value.decode("utf-8", "replace")
             return
-        found = int.from_bytes(value)
-        what = telnet.group_of(found) if setting == Setting.CONTROL else _NAMED.get(setting, "")
+        confirmed = int.from_bytes(value)
+        what = telnet.group_of(confirmed) if setting == Setting.CONTROL else _NAMED.get(setting, "")
         if what in self._asked and not self._asked[what][1].done():
-            self._asked[what][1].set_result(found)
+            self._asked[what][1].set_result(confirmed)
 
     def _break(self, error: TransportLost) -> None:
         self._loss = TransportLost(f"{self.name} was lost: {self._farewell}") if self._farewell else error
@@ -260,9 +261,9 @@ class Rfc2217Control(PortControl):
         self.baud = 0
 
     def set_baud(self, baud: int) -> None:
-        found = self._ask(telnet.NAMES[Setting.BAUD], Setting.BAUD, baud)
-        if found != baud:
-            raise OSError(f"the server does not accept {baud} baud (it has {found})")
+        taken = self._ask(telnet.NAMES[Setting.BAUD], Setting.BAUD, baud)
+        if taken != baud:
+            raise OSError(f"the server does not accept {baud} baud (it has {taken})")
         self.baud = baud
 
     def _switch(self, line: str, on: bool) -> None:

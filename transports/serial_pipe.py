@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
-from multidrop.transports import Endpoint, PortControl
+from multidrop.transports import Descriptor, PortControl
 from multidrop.transports.pipe import DescriptorPipe
 from multidrop.transports.port_users import beside, suspects
 
@@ -15,7 +15,7 @@ VALID = 10.0
 class SerialPipe(DescriptorPipe):
     """A serial port of this machine. `other_user`: what `beside` found at the opening."""
 
-    def __init__(self, endpoint: Endpoint, control: PortControl, other_user: str) -> None:
+    def __init__(self, endpoint: Descriptor, control: PortControl, other_user: str) -> None:
         super().__init__(endpoint, control)
         self.limits = self._other = other_user
         self._suspects = ""

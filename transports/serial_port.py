@@ -41,7 +41,7 @@ _PATIENCE = 0.5
 """Seconds after which a waiting read checks for its end: a cancel between two reads would be lost."""
 _STUCK = 10.0
 """Seconds after which a port that takes no byte is lost, where a write waits: 256 bytes at 300 baud take 8.5 s."""
-_READ = 4096
+_READ_BYTES = 4096
 _GONE = "the port is gone (unplugged, or its other side closed it); plug it in"
 
 
@@ -115,32 +115,32 @@ def _nothing(port: str) -> str:
     return f"no port {port}; plug it in, or see `multidrop ports`{taker()}"
 
 
-USUAL = "dialout"
+USUAL_GROUP = "dialout"
 """The group of serial ports in most distributions."""
 
 
 def _permission(port: str) -> str:
     """The remedy for a port that this account may not open: it depends on the owner, the group and the mode."""
-    usual = f"`sudo usermod -aG {USUAL} $USER`, then log in again"
+    usual = f"`sudo usermod -aG {USUAL_GROUP} $USER`, then log in again"
     if sys.platform == "win32":
         return usual
     try:
-        found = os.stat(port)
+        facts = os.stat(port)
     except OSError:
         return usual
-    mode, name = found.st_mode & 0o777, _group_name(found.st_gid)
-    rule = f"a udev rule with GROUP={USUAL!r}, MODE='0660' lets that group use it"
+    mode, name = facts.st_mode & 0o777, _group_name(facts.st_gid)
+    rule = f"a udev rule with GROUP={USUAL_GROUP!r}, MODE='0660' lets that group use it"
     shown, group = f"its mode is {mode:04o}", shlex.quote(name)
-    if found.st_uid == os.geteuid():
+    if facts.st_uid == os.geteuid():
         if mode & 0o600 == 0o600:
             return f"you own it, and {shown}: {ELSEWHERE}"
         return f"you own it, and {shown}: `chmod u+rw {shlex.quote(port)}`"
-    if mode & 0o060 != 0o060 or found.st_gid == 0:
+    if mode & 0o060 != 0o060 or facts.st_gid == 0:
         who = f"group {name}, {shown}" if mode & 0o060 != 0o060 else f"it is of the group {name} only"
         return f"{who}, so no other group helps: {rule}"
-    if found.st_gid in (os.getegid(), *os.getgroups()):
+    if facts.st_gid in (os.getegid(), *os.getgroups()):
         return f"you are in its group {name}, which may use it: {ELSEWHERE}"
-    if _is_member(found.st_gid):
+    if _is_member(facts.st_gid):
         return f"you are in its group {name}, but this login began before that: log out and in again"
     return f"`sudo usermod -aG {group} $USER`, then log in again"
 
@@ -280,7 +280,7 @@ if sys.platform != "win32":
 
         def read(self) -> bytes | None:
             """Bytes that arrived; None if the port was hung up."""
-            return os.read(self._descriptor, _READ) or None
+            return os.read(self._descriptor, _READ_BYTES) or None
 
         def write(self, data: bytes | memoryview) -> int:
             return os.write(self._descriptor, data)

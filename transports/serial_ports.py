@@ -37,7 +37,7 @@ def list_ports(root: Path = Path("/")) -> list[PortInfo]:
 
     listed = pyserial.comports()
     stable = usb_names(listed) if sys.platform == "win32" else _stable_names(root)
-    found = [
+    infos = [
         PortInfo(
             port.device,
             stable.get(port.device if sys.platform == "win32" else os.path.realpath(port.device), ""),
@@ -46,7 +46,7 @@ def list_ports(root: Path = Path("/")) -> list[PortInfo]:
         for port in listed
         if _has_hardware(port.device, root)
     ]
-    return sorted(found, key=lambda port: natural(port.device))
+    return sorted(infos, key=lambda port: natural(port.device))
 
 
 def stable_name(device: str, root: Path = Path("/")) -> str:
@@ -74,8 +74,8 @@ def present(name: str) -> str:
 
 def com_name(port: str) -> str:
     r"""Return the one form of a COM port's name: `COM10` for `com10` and `\\.\COM10`; other names as they are."""
-    found = _COM.fullmatch(port)
-    return found[1].upper() if found else port
+    match = _COM.fullmatch(port)
+    return match[1].upper() if match else port
 
 
 def usb_names(ports: Iterable[ListPortInfo]) -> dict[str, str]:

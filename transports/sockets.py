@@ -29,7 +29,7 @@ if sys.platform != "win32":
 
 CONNECT = 5.0
 """Greatest time in seconds to connect: name look-up and all addresses of a host together."""
-_READ = 65536
+_READ_BYTES = 65536
 _PIECE = 4096
 """Bytes of a stream per turn of the event loop: one flooded line must not delay all others, and the keys."""
 _PATIENCE = 0.5
@@ -141,11 +141,11 @@ async def connected(
 
 async def _first(host: str, port: int, kind: socket.SocketKind, within: float) -> socket.socket:
     """Connect to the first address of the host that accepts. Each gets its share of the time."""
-    found = await _look_up(host, port, kind)
+    addresses = await _look_up(host, port, kind)
     failed: OSError = TimeoutError()
-    for family, _, protocol, _, address in found:
+    for family, _, protocol, _, address in addresses:
         try:
-            async with asyncio.timeout(within / len(found)):
+            async with asyncio.timeout(within / len(addresses)):
                 return await _socket(family, kind, protocol, address)
         except OSError as error:
             failed = error
@@ -198,7 +198,7 @@ class _Socket:
 
     def read(self) -> bytes | None:
         """Bytes that arrived. An empty read is the end of a stream, but a valid datagram."""
-        data = self._socket.recv(_PIECE if self._stream else _READ)
+        data = self._socket.recv(_PIECE if self._stream else _READ_BYTES)
         return data or (None if self._stream else b"")
 
     def explain(self, error: OSError | None) -> str:
@@ -208,7 +208,7 @@ class _Socket:
         """Read what arrived, and close: unread bytes would turn the close into an abort."""
         with contextlib.suppress(OSError):
             self._socket.setblocking(False)
-            while self._stream and self._socket.recv(_READ):
+            while self._stream and self._socket.recv(_READ_BYTES):
                 pass
         self._socket.close()
 

@@ -23,7 +23,7 @@ from collections.abc import Iterator
 
 from multidrop.transports import Transport, Unreachable
 from multidrop.transports.pipe import DescriptorPipe, in_thread
-from multidrop.transports.relay import GREETING, WORD, Frames, Garbled, Kind, frame
+from multidrop.transports.relay import GREETING, WORD, FrameSplitter, GarbledFrame, Kind, frame
 from multidrop.transports.relay_pipe import RelayPipe, SocketStream
 from multidrop.transports.ssh import RELAY, SOCAT, FarPort, NotInstalled
 
@@ -112,8 +112,8 @@ def reason(far: FarPort, status: int | None, words: str, way: str = "") -> str:
         lacking = f"{way} is not" if way else "neither multidrop nor socat is"
         also = f" ({words})" if words else ""
         return f"{lacking} installed on {far.host}{also}; install {way or RELAY} there"
-    found = next((hint for part, hint in _HINTS if part in words.lower()), "")
-    hint = f"; {found.format(login=far.login)}" if found else ""
+    known = next((hint for part, hint in _HINTS if part in words.lower()), "")
+    hint = f"; {known.format(login=far.login)}" if known else ""
     if any(part in words.lower() for part in _WINDOWS):
         there = f"there `multidrop share {far.path[1:]} --rfc2217 2217`, here `ssh -L 2217:127.0.0.1:2217 {far.login}`"
         return f"its shell is one of Windows, where the relay does not run; {there} and rfc2217://127.0.0.1:2217"
@@ -142,7 +142,7 @@ _SETTLE = 0.3
 """Seconds in which socat ends if it cannot open the port."""
 _ENDING = 2.5
 """Seconds that ssh gets for its end once its input has ended."""
-_READ = 4096
+_READ_BYTES = 4096
 _PREFIX = re.compile(r"multidrop: |\S+ \S+ socat\[\d+\] [A-Z] ")
 """The beginning of each line of the far side."""
 
@@ -188,7 +188,9 @@ class SshSession(SocketStream):
     def last_words(self) -> str:
         """The last line that ssh or the far side has printed."""
         size = os.fstat(self._words.fileno()).st_size
-        text = os.pread(self._words.fileno(), _READ, max(self._heard, size - _READ)).decode(errors="replace")
+        text = os.pread(self._words.fileno(), _READ_BYTES, max(self._heard, size - _READ_BYTES)).decode(
+            errors="replace"
+        )
         lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
         return _PREFIX.sub("", lines[-1])[:400].rstrip(".") if lines else ""
 
@@ -210,7 +212,7 @@ class SshSession(SocketStream):
         with contextlib.suppress(OSError):
             while (left := deadline - time.monotonic()) > 0:
                 self._socket.settimeout(left)
-                if not self._socket.recv(_READ):
+                if not self._socket.recv(_READ_BYTES):
                     break
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(max(0.05, deadline - time.monotonic()))
@@ -241,7 +243,7 @@ class SocatEndpoint:
         return self._session.unsent()
 
     def read(self) -> bytes | None:
-        return self._session.read(_READ) or None
+        return self._session.read(_READ_BYTES) or None
 
     def drop(self) -> int:
         return 0
@@ -270,9 +272,9 @@ async def greeted(session: SshSession, far: FarPort, baud: int, way: str) -> Tra
 
 async def _measured(session: SshSession, early: bytes) -> tuple[bytes, float]:
     """Ask for a sign of life; return all bytes that have arrived by its reply, and the time that it took, s."""
-    frames, began = Frames(), time.monotonic()
+    frames, began = FrameSplitter(), time.monotonic()
     session.mark()
-    with contextlib.suppress(Garbled, OSError):  # which the pipe reports
+    with contextlib.suppress(GarbledFrame, OSError):  # which the pipe reports
         session.write(frame(Kind.BEAT))
         replied = any(kind is Kind.BEAT for kind, _ in frames.take(early))
         while not replied and (data := await session.read_some()):

@@ -12,7 +12,7 @@ IAC = 0xFF
 SE, IP, SB = 0xF0, 0xF4, 0xFA
 WILL, WONT, DO, DONT = 0xFB, 0xFC, 0xFD, 0xFE
 BINARY, SGA = 0x00, 0x03
-LONGEST = 256
+LONGEST_SUBNEGOTIATION = 256
 """The bytes of a subnegotiation that are kept: no known one is longer, and the other end must not fill the memory."""
 OPPOSITE = {WILL: DO, DO: WILL}
 REFUSAL = {WILL: DONT, DO: WONT}
@@ -105,7 +105,7 @@ class Decoder:
     def _keep(self, byte: int) -> None:
         if self._body is None:
             self._plain.append(byte)
-        elif len(self._body) < LONGEST:
+        elif len(self._body) < LONGEST_SUBNEGOTIATION:
             self._body.append(byte)
 
     def _event(self, event: Event) -> None:

@@ -29,7 +29,7 @@ closing: set[str] = set()
 """The names of the devices whose close has not returned."""
 
 
-class Device(Protocol):
+class BlockingDevice(Protocol):
     """A blocking device. Raises OSError (pyserial's errors are that, too) when it is broken."""
 
     @property
@@ -60,11 +60,11 @@ class Device(Protocol):
 
 
 class ThreadedPipe(Pipe):
-    """A transport over a `Device`."""
+    """A transport over a `BlockingDevice`."""
 
     preemptible = True
 
-    def __init__(self, device: Device, control: PortControl | None = None) -> None:
+    def __init__(self, device: BlockingDevice, control: PortControl | None = None) -> None:
         super().__init__(device.name, control)
         self._device = device
         self._turn = threading.Condition()

@@ -20,14 +20,23 @@ from multidrop.tui.assist import Assist
 from multidrop.tui.keymap import Keymap
 from multidrop.tui.leaving import Leaving
 from multidrop.tui.outbox import ended
-from multidrop.tui.palette import LATELY, PADDING, PALETTE, Command, all_commands, commands_like, entries, ordered
+from multidrop.tui.palette import (
+    LATELY,
+    PADDING,
+    PALETTE,
+    PaletteCommand,
+    all_commands,
+    commands_like,
+    entries,
+    ordered,
+)
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
 from multidrop.tui.purpose import Purpose
-from multidrop.tui.screens.dialogs import Ask, Choose, Offer, Search
+from multidrop.tui.screens.dialogs import Ask, Choose, ListedChoice, SearchDialog
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.page import Host, Page, page_entry
-from multidrop.tui.screens.questions import Questions, drive_choices, lines_like, place_of
+from multidrop.tui.screens.page import Page, PageHost, page_entry
+from multidrop.tui.screens.questions import ScreenQuestions, drive_choices, lines_like, place_of
 from multidrop.tui.screens.start import Opener
 from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection
@@ -44,7 +53,7 @@ def names_of(session: Session) -> list[str]:
 
 
 @dataclass
-class Parts(Host):
+class ScreenParts(PageHost):
     """The parts of one app that its actions work on."""
 
     app: App[int]
@@ -52,7 +61,7 @@ class Parts(Host):
     assist: Assist
     purpose: Purpose
     selection: Selection
-    questions: Questions
+    questions: ScreenQuestions
     keymap: Keymap
     opener: Opener
     tour: Tour
@@ -63,10 +72,10 @@ class Parts(Host):
     mouse_on: bool = True
 
 
-class Actions:
+class ScreenActions:
     """The target of actions: they change what is shown, send lines, select, open pages and dialogs."""
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: ScreenParts) -> None:
         self._parts = parts
         self._key = ""
         """The function key that the last recording was begun for."""
@@ -110,14 +119,14 @@ class Actions:
 
     async def action_choose_theme(self) -> None:
         app, ours = self._parts.app, [theme.name for theme in THEMES]
-        themes = [Offer(name, name) for name in [*ours, *sorted(set(app.available_themes) - set(ours))]]
+        themes = [ListedChoice(name, name) for name in [*ours, *sorted(set(app.available_themes) - set(ours))]]
         await self._parts.questions.open(Choose("Theme", themes, app.theme), partial(setattr, app, "theme"))
 
     async def action_choose_signs(self) -> None:
         answers = [
-            Offer(Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
-            Offer(Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
-            Offer(Signs.ASCII.value, "ascii    nothing but ASCII"),
+            ListedChoice(Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
+            ListedChoice(Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
+            ListedChoice(Signs.ASCII.value, "ascii    nothing but ASCII"),
         ]
         await self._parts.questions.open(Choose("Signs", answers), lambda name: self.show_signs(Signs(name)))
 
@@ -133,9 +142,9 @@ class Actions:
         sheet = getattr(parts.app.screen, "SHEET", "main")
         if getattr(parts.app.screen, "heading", "") == HELP:
             return
-        found = entries(sheet, parts.keymap, parts.macros.bound)
+        rows = entries(sheet, parts.keymap, parts.macros.bound)
         width = min(PALETTE, parts.app.size.width) - PADDING
-        await parts.app.push_screen(Search(HELP, lambda typed: help_on(found, typed, width), "close"))
+        await parts.app.push_screen(SearchDialog(HELP, lambda typed: help_on(rows, typed, width), "close"))
 
     def action_explain(self) -> None:
         """Copy the selected text on Ctrl+C, else name the keys that end and stop."""
@@ -154,7 +163,7 @@ class Actions:
         parts, beside = self._parts, self._parts.main.beside
         if not beside.display:
             drives, _ = drive_choices(parts.session, partial(glances_of, parts.session, parts.model))
-            lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in names_of(parts.session)]
+            lines = [ListedChoice(f"{name}\n", f" {name:<8} all of the line") for name in names_of(parts.session)]
             if lines:
                 halves = Choose("The other half shows", [*drives, *lines])
                 await parts.questions.open(halves, lambda key: self._show_half(*place_of(key)))
@@ -259,7 +268,7 @@ class Actions:
 
     def action_switch(self, name: str) -> None:
         """Type the line that changes a switch of a feature."""
-        self._parts.outbox.type(next(each.typed(self._parts.session) for each in switches() if each.name == name))
+        self._parts.outbox.type(next(switch.typed(self._parts.session) for switch in switches() if switch.name == name))
 
     def action_units(self) -> None:
         """Type the line that shows the drives' own numbers, or units again."""
@@ -271,30 +280,30 @@ class Actions:
     async def action_search_history(self) -> None:
         """Search the lines typed before; the one that is taken goes into the line and is not sent."""
         kept = list(dict.fromkeys(reversed(self._parts.assist.history())))
-        box = Search("Lines typed before", lambda text: lines_like(kept, text), "into the line")
+        box = SearchDialog("Lines typed before", lambda text: lines_like(kept, text), "into the line")
         await self._parts.questions.open(box, self.action_begin_line)
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[PaletteCommand]:
         parts = self._parts
         front = parts.app.screen
         sheet = front.SHEET if isinstance(front, Page) else ""
         switches = {"polling": parts.purpose.polling.on, "mouse": parts.mouse_on}
-        found = all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, sheet)
-        return ordered(list(found), parts.recent)
+        commands = all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches, sheet)
+        return ordered(list(commands), parts.recent)
 
     async def action_palette(self) -> None:
         parts = self._parts
-        if isinstance(parts.app.screen, Search):
+        if isinstance(parts.app.screen, SearchDialog):
             return
-        found, page = self.commands(), parts.app.screen
+        commands, page = self.commands(), parts.app.screen
 
         async def run(key: str) -> None:
-            taken = found[int(key)]
-            parts.recent = [taken.action, *(each for each in parts.recent if each != taken.action)][:LATELY]
+            taken = commands[int(key)]
+            parts.recent = [taken.action, *(action for action in parts.recent if action != taken.action)][:LATELY]
             await parts.app.run_action(taken.action, page if taken.here else parts.main)
 
         width = min(PALETTE, parts.app.size.width) - PADDING
-        everything = Search("Everything", lambda typed: commands_like(found, typed, width), "do it")
+        everything = SearchDialog("Everything", lambda typed: commands_like(commands, typed, width), "do it")
         await parts.questions.open(everything, run)
 
     async def action_choose_drive(self) -> None:
@@ -330,7 +339,7 @@ class Actions:
         if why := parts.purpose.refused(name):
             parts.show_line(why, "x")
             return
-        shown = next((each for each in app.screen_stack if isinstance(each, Page)), None)
+        shown = next((screen for screen in app.screen_stack if isinstance(screen, Page)), None)
         if shown is None:
             await app.push_screen(page(parts))
         elif shown is app.screen and type(shown) is not page:

@@ -29,12 +29,12 @@ from textual.screen import Screen
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.broken_configuration import placed, placed_in_file
-from multidrop.shell.configuration import DEFAULT_LOOK, Look, Settings, parse
+from multidrop.shell.configuration import DEFAULT_LOOK, ScreenSettings, Settings, parse
 from multidrop.shell.connect.urls import wrong_urls
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.sections import sections
 from multidrop.shell.session import Session
-from multidrop.tui.actions import Actions, Parts
+from multidrop.tui.actions import ScreenActions, ScreenParts
 from multidrop.tui.assist import Assist
 from multidrop.tui.boundary import Boundary
 from multidrop.tui.frame_scheduler import AGEING, Frames
@@ -46,10 +46,10 @@ from multidrop.tui.panels.view import between_at, figures_at, name_at
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.purpose import Purpose
 from multidrop.tui.screen_model import Record, ScreenModel
-from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
+from multidrop.tui.screens.dialogs import LEAST_SIZE, Over, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Page, show_rows
-from multidrop.tui.screens.questions import Questions
+from multidrop.tui.screens.questions import ScreenQuestions
 from multidrop.tui.screens.start import Opener, Start
 from multidrop.tui.session_hooks import Hooks
 from multidrop.tui.terminal.keyboard import Keyboard
@@ -89,7 +89,7 @@ class MultidropApp(Dressed):
         urls: Sequence[str],
         assist: Assist,
         driver: type[Driver] | None = None,
-        look: Look = DEFAULT_LOOK,
+        look: ScreenSettings = DEFAULT_LOOK,
         model: ScreenModel | None = None,
         purpose: Purpose | None = None,
     ) -> None:
@@ -119,7 +119,7 @@ class MultidropApp(Dressed):
             session, self.model, self.main, self.purpose.label, self.keyboard.turn_deaf, self.show_line
         )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
-        self.questions = Questions(self, session, self.main, self.keyboard, lambda: self._check_size(self.size))
+        self.questions = ScreenQuestions(self, session, self.main, self.keyboard, lambda: self._check_size(self.size))
         self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
@@ -147,7 +147,7 @@ class MultidropApp(Dressed):
     def _set_actions(self) -> None:
         """Make what keys, the palette and the session ask of the screen."""
         self.outbox.follows = self._enter_waits
-        parts = Parts(
+        parts = ScreenParts(
             self.session,
             self.model,
             self.outbox,
@@ -171,7 +171,7 @@ class MultidropApp(Dressed):
             self.signs,
             self.leaving,
         )
-        self.act = Actions(parts)
+        self.act = ScreenActions(parts)
         self._action_targets |= {"act"}
         Hooks(parts, self.act, self.presenter)
 
@@ -356,7 +356,7 @@ class MultidropApp(Dressed):
         ready = getattr(self._driver, "ready", None)
         if ready is not None and not ready():
             return False
-        page = next((each for each in self.screen_stack if isinstance(each, Page) and each.is_running), None)
+        page = next((screen for screen in self.screen_stack if isinstance(screen, Page) and screen.is_running), None)
         self.presenter.paint(self.main, self.session.now(), panels, page)
         if panels:
             with self.boundary.at("the tour"):
@@ -386,7 +386,7 @@ class MultidropApp(Dressed):
         self._raise_banner()
 
     def _poll(self) -> None:
-        page = next((each for each in self.screen_stack if isinstance(each, Page)), None)
+        page = next((screen for screen in self.screen_stack if isinstance(screen, Page)), None)
         with self.boundary.at("the polls"):
             wants = self.main.wants() if page is None else page.WANTS
             self.purpose.polling.update(self.session, self.model, wants)
@@ -408,7 +408,7 @@ class MultidropApp(Dressed):
             resized()
 
     def _check_size(self, size: Size) -> None:
-        small = size.width < LEAST[0] or size.height < LEAST[1]
+        small = size.width < LEAST_SIZE[0] or size.height < LEAST_SIZE[1]
         said = isinstance(self.screen, TooSmall)
         if small and not said:
             self.push_screen(TooSmall())
@@ -442,7 +442,7 @@ class MultidropApp(Dressed):
 
     def notify(self, message: str, *, timeout: float | None = None, **_: object) -> None:
         """Show a line for a while where it covers nothing: in the box that is open, else above the footer."""
-        shown = next((each for each in reversed(self.screen_stack) if isinstance(each, Over | Framed)), None)
+        shown = next((screen for screen in reversed(self.screen_stack) if isinstance(screen, Over | Framed)), None)
         if shown is not None:
             shown.tell(message)
             self.set_timer(timeout or TOLD, lambda: shown.tell("") if shown.told == message else None)
@@ -462,16 +462,16 @@ class MultidropApp(Dressed):
 def bindings() -> list[BindingType]:
     """The keys of all screens that can be set, those of the app first; no page has one of its own."""
     screens: list[type[Framed]] = [Framed, MainScreen, Page]
-    return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]
+    return [*MultidropApp.BINDINGS, *(binding for screen in screens for binding in screen.BINDINGS)]
 
 
 def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
     """What is wrong in a configuration beyond its form: keys, themes, the URLs of connections, files that it names."""
     look = found.look
     troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme)]
-    for name, each in sections().items():
+    for name, section in sections().items():
         try:
-            troubles += each.unreadable(found.section(name))
+            troubles += section.unreadable(found.section(name))
         except Diagnostic as problem:  # of a feature by others
             troubles.append(f"{name}: {problem.message}")
     troubles += wrong_urls(found.connections.values())

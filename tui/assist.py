@@ -67,12 +67,18 @@ class Assist:
         self._history.append(line)
 
     def saved(self) -> Sequence[StartEntry]:
-        return [StartEntry("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
+        return [
+            StartEntry("saved", connection.name, connection.name, connection.url)
+            for connection in self._settings.connections.values()
+        ]
 
     def wrong(self) -> Sequence[StartEntry]:
         """The first error of the configuration; opening it edits the file at its line."""
-        found = self._settings.problems[:1]
-        return [StartEntry("wrong", Path(each.where).name, EDIT, f"{each.message}; Enter edits it") for each in found]
+        problems = self._settings.problems[:1]
+        return [
+            StartEntry("wrong", Path(problem.where).name, EDIT, f"{problem.message}; Enter edits it")
+            for problem in problems
+        ]
 
     async def ports(self) -> Sequence[StartEntry]:
         """Serial ports of this machine: who holds each, or which drives replied there last. The search may be slow."""
@@ -83,8 +89,11 @@ class Assist:
         from multidrop.shell.state.opened import lately
 
         now, saved = time.time(), self._settings.connections
-        found = [each for each in lately(self._settings.state) if each.url not in saved]
-        return [StartEntry("lately", each.url, each.url, f"opened {ago(now - each.at)}") for each in found[:LATELY]]
+        openings = [recent for recent in lately(self._settings.state) if recent.url not in saved]
+        return [
+            StartEntry("lately", recent.url, recent.url, f"opened {ago(now - recent.at)}")
+            for recent in openings[:LATELY]
+        ]
 
     async def opened(self, url: str) -> None:
         """Keep a URL that was opened."""
@@ -147,7 +156,7 @@ def _ports(state: Path) -> list[StartEntry]:
     entries = []
     for port in local_ports():
         memory, at = memory_of(state, port.stable_name or port.device)
-        names = " ".join(filter(None, (each.address for each in memory.drives))) or "a drive"
+        names = " ".join(filter(None, (drive.address for drive in memory.drives))) or "a drive"
         answered = f"{names} answered {ago(time.time() - at)}" if memory.drives else ""
         held = holder(port.device)
         parts = [f"✗ in use by {held}" if held else "", answered, port.description or "-", port.stable_name]

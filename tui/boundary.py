@@ -41,7 +41,7 @@ RAISES = False
 """Defects are raised, not caught: for tests."""
 FILE = "defects.log"
 """The file of tracebacks, in the state folder."""
-MOST = 50
+MOST_LOGGED_DEFECTS = 50
 """Greatest number of defects that one run writes; further ones are counted."""
 GOES_ON = "everything else goes on, and Ctrl+X stops all drives"
 
@@ -101,7 +101,7 @@ class Boundary:
         self.failing[place] = text
         known = self.counts.get((place, origin), 0)
         self.counts[place, origin] = known + 1
-        if not known and len(self.counts) <= MOST:
+        if not known and len(self.counts) <= MOST_LOGGED_DEFECTS:
             written = self._write(place, failure)
             details = f"details: {self.path}" if written else f"{self.path} could not be written"
             with self.at("what is said of a defect"):  # the part that shows a line may be defective, too

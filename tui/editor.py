@@ -17,7 +17,7 @@ from textual.widgets import TextArea
 
 from multidrop.base import places
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.program_files import Entry, Part, Problem
+from multidrop.dialects.program_files import LinePart, Problem, ProgramEntry
 from multidrop.macros import parse_macro
 from multidrop.shell import configuration
 from multidrop.shell.programs.edited_file import STAND_INS, edited
@@ -37,9 +37,9 @@ class MacroGrammar:
     def __init__(self, file: str) -> None:
         self._file = file
 
-    def parts(self, line: str) -> Sequence[Part]:
+    def parts(self, line: str) -> Sequence[LinePart]:
         """The parts of a line that have a style of their own."""
-        return [Part(*found.span(), found.lastgroup or "") for found in _TOML.finditer(line)]
+        return [LinePart(*match.span(), match.lastgroup or "") for match in _TOML.finditer(line)]
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
         """Every problem of a text, in order: the macro is read as it is when it is played."""
@@ -50,7 +50,7 @@ class MacroGrammar:
             return [problem_of(problem)]
         return ()
 
-    def entries(self, text: str) -> Sequence[Entry]:
+    def entries(self, text: str) -> Sequence[ProgramEntry]:
         """The places at which it can begin: a macro begins at its first step."""
         return ()
 
@@ -62,7 +62,7 @@ class ConfigurationGrammar(MacroGrammar):
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
         """Every problem of a text, in order."""
-        return [problem_of(each) for each in configuration.parse(text, self._file, lenient=True).problems]
+        return [problem_of(problem) for problem in configuration.parse(text, self._file, lenient=True).problems]
 
 
 def problem_of(found: Diagnostic) -> Problem:

@@ -15,7 +15,7 @@ from multidrop.tui.text import digits
 
 if TYPE_CHECKING:
     from multidrop.dialects.units import Measure
-    from multidrop.shell.units import Axis
+    from multidrop.shell.units import ScaledAxis
 
 UNSURE = "?"
 """The sign of a scale that could not be confirmed since a program began to run."""
@@ -23,7 +23,7 @@ COARSER = 2
 """Decimals that a velocity has less than a position."""
 
 
-class Conversion(NamedTuple):
+class UnitConversion(NamedTuple):
     """Numbers of a drive to units: `value = gain * number + zero`."""
 
     gain: float = 1.0
@@ -38,8 +38,8 @@ class Figures(NamedTuple):
 
     unit: str = ""
     speed_unit: str = ""
-    places: Conversion = Conversion()
-    speeds: Conversion = Conversion()
+    places: UnitConversion = UnitConversion()
+    speeds: UnitConversion = UnitConversion()
     decimals: int = 0
     sign: str = ""
     """`?` after each unit while the scale is not confirmed."""
@@ -75,7 +75,7 @@ class Figures(NamedTuple):
 NATIVE = Figures()
 
 
-def figures_of(axis: Axis | None, referenced: bool) -> Figures:
+def figures_of(axis: ScaledAxis | None, referenced: bool) -> Figures:
     """The figures of an axis: its drive's own numbers where it has no scale, or one that does not hold.
 
     `referenced`: its places count.
@@ -93,8 +93,8 @@ def _figures(measure: Measure, sure: bool, referenced: bool) -> Figures:
     return Figures(
         unit=measure.unit,
         speed_unit=measure.unit_for(Takes.VELOCITY) if rated else "",
-        places=Conversion(gain, measure.value(0)),
-        speeds=Conversion(measure.value(1, Takes.VELOCITY)) if rated else Conversion(),
+        places=UnitConversion(gain, measure.value(0)),
+        speeds=UnitConversion(measure.value(1, Takes.VELOCITY)) if rated else UnitConversion(),
         decimals=max(0, ceil(-log10(abs(gain)))),
         sign="" if sure else UNSURE,
         travel=None if ends is None else (ends[0], ends[1]),

@@ -96,13 +96,13 @@ class Frames:
         self._owed = not self.tick()
 
 
-PATIENCE = 2.0
+REPLY_TIMEOUT = 2.0
 """Seconds to wait for a reply."""
-TRIES = 3
+MOST_UNANSWERED = 3
 """Number of missing replies in a row after which none is waited for."""
 
 
-class Pace:
+class TerminalPace:
     """The state of a terminal's replies. `clock` returns seconds; `handed_over` is true once the system took all
     output.
     """
@@ -122,17 +122,17 @@ class Pace:
             return False
         if self._asked_at is None:
             return True
-        if self._answers and self._clock() - self._asked_at < PATIENCE:
+        if self._answers and self._clock() - self._asked_at < REPLY_TIMEOUT:
             return False
         self._asked_at = None
         self._unanswered += 1
-        self._answers = self._answers and self._unanswered < TRIES
+        self._answers = self._answers and self._unanswered < MOST_UNANSWERED
         return True
 
     def ask(self) -> bool:
         """Return True if the terminal should be asked after the frame that was just written."""
         now = self._clock()
-        seldom = self._unanswered >= TRIES and (not self._known or now - self._last < PATIENCE)
+        seldom = self._unanswered >= MOST_UNANSWERED and (not self._known or now - self._last < REPLY_TIMEOUT)
         if self._asked_at is not None or seldom:
             return False
         self._asked_at = self._last = now

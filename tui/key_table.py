@@ -63,8 +63,8 @@ class Key(NamedTuple):
     @property
     def shown(self) -> str:
         """The first key of each part as the screen writes it: `^B`, `←→`, `1-9`, `Home`."""
-        parts = [shown_key(each.split(",")[0]) for each in self.keys.split(" / ")]
-        return ("" if all(len(each) == 1 for each in parts) else " ").join(parts)
+        parts = [shown_key(key.split(",")[0]) for key in self.keys.split(" / ")]
+        return ("" if all(len(part) == 1 for part in parts) else " ").join(parts)
 
     @property
     def single(self) -> Iterator[tuple[str, str, str]]:
@@ -86,7 +86,7 @@ def shown_key(key: str) -> str:
     return key if len(key) == 1 else key_words(key)
 
 
-class Sheet(NamedTuple):
+class KeySheet(NamedTuple):
     """A page, a box or a part of the screen: what it is for, and its keys in groups."""
 
     title: str
@@ -108,16 +108,18 @@ STOP = Key("ctrl+x", "", "STOP ALL: drives, macros, scripts; from anywhere", "ST
 """The stop: it is found below every binding."""
 
 
-def _sheets() -> dict[str, Sheet]:
+def _sheets() -> dict[str, KeySheet]:
     groups: dict[str, dict[str, list[Key]]] = {}
     for row in rows(__file__, "keys.csv"):
         key = Key(row["keys"], row["action"], row["about"], row["word"], row["name"], bool(row["first"]))
         groups.setdefault(row["sheet"], {}).setdefault(row["group"], []).append(key)
     join_others()  # their keys are bound as the classes of the screen are made
-    for each in switches():
-        groups["main"]["Lines of drives"].append(Key("", f"act.switch('{each.name}')", each.keyed, name=each.name))
+    for switch in switches():
+        groups["main"]["Lines of drives"].append(
+            Key("", f"act.switch('{switch.name}')", switch.keyed, name=switch.name)
+        )
     return {
-        row["sheet"]: Sheet(
+        row["sheet"]: KeySheet(
             row["title"], row["about"], groups[row["sheet"]], row["below"].split(), row["foot"].split(" | ")
         )
         for row in rows(__file__, "sheets.csv")
@@ -158,18 +160,18 @@ class Keyed:
 
 def all_groups(name: str) -> dict[str, list[Key]]:
     """The keys that work with a sheet, in groups: its own, then those of the sheets below it."""
-    found: dict[str, list[Key]] = {}
+    groups: dict[str, list[Key]] = {}
     for sheet in [name, *below(name)]:
         for group, keys in SHEETS[sheet].groups.items():
-            taken = {each for keys_ in found.values() for key in keys_ for each in key.keys.split(" / ") if each}
+            taken = {each for keys_ in groups.values() for key in keys_ for each in key.keys.split(" / ") if each}
             rest = [key for key in keys if not key.keys or key.keys not in taken]
-            found.setdefault(group, []).extend(rest)
-    return found
+            groups.setdefault(group, []).extend(rest)
+    return groups
 
 
 def below(name: str) -> list[str]:
     """The sheets below a sheet, the nearest first."""
-    return [each for under in SHEETS[name].below for each in (under, *below(under))]
+    return [sheet for under in SHEETS[name].below for sheet in (under, *below(under))]
 
 
 def footer(name: str) -> list[Key]:
@@ -177,13 +179,13 @@ def footer(name: str) -> list[Key]:
     sheet = SHEETS[name]
     own = [key for key in sheet.keys if key.word and key.keys]
     others = [key for each in below(name) for key in SHEETS[each].keys]
-    found: list[Key] = []
+    keys: list[Key] = []
     for word in sheet.foot:
-        found += own if word == "*" else [key for key in others if key.word == word][:1]
-    return found
+        keys += own if word == "*" else [key for key in others if key.word == word][:1]
+    return keys
 
 
 def hint(name: str, **words: str) -> str:
     """The keys of a box in one line; `words` replace those of a key: `enter="open"`."""
-    keys = [*SHEETS[name].keys, *(key for each in below(name) for key in SHEETS[each].keys if key.action == "leave")]
+    keys = [*SHEETS[name].keys, *(key for sheet in below(name) for key in SHEETS[sheet].keys if key.action == "leave")]
     return "   ".join(f"{key.shown} {words.get(key.keys, key.word)}" for key in keys if key.word)

@@ -27,7 +27,7 @@ FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "back
 FIXED |= {"ctrl+h", "ctrl+i", "ctrl+j", "ctrl+m", "ctrl+z"}
 """Keys that no function can have, as every line and every list needs them, or as they are the same bytes."""
 _MODIFIERS = ("ctrl", "alt", "shift")
-_KNOWN = {each.value for each in Keys} | {"f" + str(number) for number in range(1, 25)}
+_KNOWN = {key.value for key in Keys} | {"f" + str(number) for number in range(1, 25)}
 _OTHER_WORDS = {"pgup": "pageup", "pgdn": "pagedown", "pgdown": "pagedown", "esc": "escape", "return": "enter"}
 
 
@@ -39,7 +39,7 @@ def read_key(text: str) -> str:
     known = name in _KNOWN or (bool(modifiers) and re.fullmatch(r"[a-z0-9]", name) is not None)
     if not known or len(set(modifiers)) < len(modifiers) or not set(modifiers) <= set(_MODIFIERS):
         return ""
-    order = [each for each in _MODIFIERS if each in modifiers]
+    order = [modifier for modifier in _MODIFIERS if modifier in modifiers]
     return "+".join([*order, name])
 
 
@@ -64,26 +64,28 @@ class Keymap:
 
 def keymap(bindings: Iterable[BindingType], wanted: Mapping[str, str]) -> Keymap:
     """Put the keys that a person set in the place of the program's own."""
-    own = [each for each in bindings if isinstance(each, Binding) and each.id]
-    found = Keymap({each.id or "": each.key for each in own}, {each.id or "": each.description for each in own})
+    own = [binding for binding in bindings if isinstance(binding, Binding) and binding.id]
+    keymap = Keymap(
+        {binding.id or "": binding.key for binding in own}, {binding.id or "": binding.description for binding in own}
+    )
     for name, text in wanted.items():
-        spelled = [read_key(each) for each in text.split(",")]
-        if trouble := _trouble(found, name, text, spelled):
-            found.troubles.append(f"keys.{visible(name)}: {trouble}")
+        spelled = [read_key(key) for key in text.split(",")]
+        if trouble := _trouble(keymap, name, text, spelled):
+            keymap.troubles.append(f"keys.{visible(name)}: {trouble}")
         else:
-            found.keys[name] = found.changed[name] = ",".join(spelled)
-    default = {each.id or "": each.key for each in own}
-    for name in list(found.changed):
-        holders = {each: other for other, keys in found.keys.items() if other != name for each in keys.split(",")}
-        taken = [each for each in found.keys[name].split(",") if each in holders]
+            keymap.keys[name] = keymap.changed[name] = ",".join(spelled)
+    default = {binding.id or "": binding.key for binding in own}
+    for name in list(keymap.changed):
+        holders = {key: other for other, keys in keymap.keys.items() if other != name for key in keys.split(",")}
+        taken = [key for key in keymap.keys[name].split(",") if key in holders]
         if taken:
-            found.keys[name] = default[name]
-            del found.changed[name]
+            keymap.keys[name] = default[name]
+            del keymap.changed[name]
             shown = key_words(taken[0])
-            found.troubles.append(
+            keymap.troubles.append(
                 f"keys.{name}: {shown} is the key of {holders[taken[0]]}; set another for one of them"
             )
-    return found
+    return keymap
 
 
 def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
@@ -93,11 +95,11 @@ def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
         return f"no such function; {meant}multidrop config show lists them"
     if not all(spelled):
         return f"{visible(text)} is not a key; write ^T, F3, Alt+1 or Ctrl+PageUp"
-    for each in spelled:
-        if "ctrl" in each.split("+") and each.endswith("+x"):
-            return f"{key_words(each)} stops all drives, and does nothing else"
-        if each in FIXED:
-            return f"{key_words(each)} cannot be given away"
+    for key in spelled:
+        if "ctrl" in key.split("+") and key.endswith("+x"):
+            return f"{key_words(key)} stops all drives, and does nothing else"
+        if key in FIXED:
+            return f"{key_words(key)} cannot be given away"
     return ""
 
 
@@ -106,7 +108,7 @@ def _alike(before: Macro, now: Macro) -> bool:
     return replace(before, key=now.key, page=now.page, note=now.note) == now
 
 
-HELD = 0.2
+REPEATED_WITHIN = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""
 
 
@@ -159,7 +161,7 @@ class FunctionKeys:
     def held(self, key: str, now: float) -> bool:
         """True if a press is the repetition of a held key, which plays nothing: else a macro would begin anew."""
         before, self._pressed = self._pressed, (key, now)
-        return before[0] == key and now - before[1] < HELD
+        return before[0] == key and now - before[1] < REPEATED_WITHIN
 
     def turn(self) -> None:
         self.page = self.pages[(self.pages.index(self.page) + 1) % len(self.pages)]

@@ -19,7 +19,7 @@ from multidrop.shell.quitting import not_sent
 from multidrop.shell.session import Session
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.screens.dialogs import Confirm
-from multidrop.tui.screens.questions import PREVIEW, Answers, Questions
+from multidrop.tui.screens.questions import PREVIEW, Answers, ScreenQuestions
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.text import visible
 from multidrop.tui.typist import NOT_TEXT
@@ -35,7 +35,7 @@ class Leaving:
     _session: Session
     _keyboard: Keyboard
     _outbox: Outbox
-    _questions: Questions
+    _questions: ScreenQuestions
     _stop: Callable[[], None]
     _unsaved: Callable[[], Sequence[str]]
     _warn: Callable[[str], None]

@@ -19,11 +19,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from multidrop.shell.line_syntax import Place, pinned
-from multidrop.shell.prompt.line_queue import BURST, Line
+from multidrop.shell.prompt.line_queue import BURST, EnteredLine
 from multidrop.shell.session import Session
 from multidrop.tui.panels.view import name_at
 
-NAMED = 4
+MOST_NAMED_LINES = 4
 """Number of lines that a report of unsent lines quotes."""
 
 
@@ -31,11 +31,11 @@ NAMED = 4
 class Lane:
     """Lines that are sent one after the other."""
 
-    waiting: deque[Line] = field(default_factory=deque)
-    running: Line | None = None
+    waiting: deque[EnteredLine] = field(default_factory=deque)
+    running: EnteredLine | None = None
     failed: str = ""
     """The reason to hold the rest: the line that failed, or another one."""
-    held: list[Line] = field(default_factory=list)
+    held: list[EnteredLine] = field(default_factory=list)
     """Lines that were not sent, and are not reported yet."""
     teller: asyncio.TimerHandle | None = None
 
@@ -54,7 +54,7 @@ class Outbox:
         """Whether another Enter has come already."""
         self._followed = False
         """The next Enter had come before the last line was typed."""
-        self._unsent: list[Line] = []
+        self._unsent: list[EnteredLine] = []
         """The lines that were last reported as not sent."""
         self._paused = self._closed = False
         self.left: list[str] = []
@@ -129,8 +129,8 @@ class Outbox:
         if lines:
             self._report("stopped", lines)
 
-    def _line(self, text: str, place: Place | None = None) -> Line:
-        return Line.entered(text, self._session.stops, self._session.place if place is None else place)
+    def _line(self, text: str, place: Place | None = None) -> EnteredLine:
+        return EnteredLine.entered(text, self._session.stops, self._session.place if place is None else place)
 
     def _talking(self, bus: str) -> Lane | None:
         return next((lane for lane in self._lanes if bus and lane.running and lane.running.bus == bus), None)
@@ -140,7 +140,7 @@ class Outbox:
         self._lanes.append(lane)
         return lane
 
-    def _add(self, lane: Lane, lines: Sequence[Line]) -> None:
+    def _add(self, lane: Lane, lines: Sequence[EnteredLine]) -> None:
         if self._closed:
             self.left += [line.text for line in lines]
             return
@@ -214,7 +214,7 @@ class Outbox:
         if lane in self._lanes:
             self._lanes.remove(lane)
 
-    def _report(self, why: str, lines: Sequence[Line]) -> None:
+    def _report(self, why: str, lines: Sequence[EnteredLine]) -> None:
         """Say which lines were not sent, and keep them, so that they can be offered again."""
         self._unsent = list(lines)
         self._warn(f"{why}; {not_sent([line.text for line in lines])}; /unsent offers {them(lines)} again")
@@ -240,5 +240,5 @@ def them(lines: Sequence[object]) -> str:
 
 def not_sent(lines: Sequence[str]) -> str:
     """`3 lines were not sent: MR 1 · MR 2 · MR 3`."""
-    named = " · ".join(line[:40] for line in lines[:NAMED]) + (" …" if len(lines) > NAMED else "")
+    named = " · ".join(line[:40] for line in lines[:MOST_NAMED_LINES]) + (" …" if len(lines) > MOST_NAMED_LINES else "")
     return f"{len(lines)} lines were not sent: {named}" if len(lines) > 1 else f"not sent: {named}"

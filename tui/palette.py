@@ -27,7 +27,7 @@ LATELY = 5
 """Number of commands that count as used lately."""
 
 
-class Command(NamedTuple):
+class PaletteCommand(NamedTuple):
     """A title, one line about it, and the Textual action (of the app, else of the main screen)."""
 
     title: str
@@ -41,11 +41,13 @@ class Command(NamedTuple):
     """It is a function of the page in front."""
 
 
-def ordered(commands: Sequence[Command], recent: Sequence[str]) -> list[Command]:
+def ordered(commands: Sequence[PaletteCommand], recent: Sequence[str]) -> list[PaletteCommand]:
     """The urgent commands, those of the page, those used lately (by their actions, the last one first), all others."""
-    urgent = [each for each in commands if each.urgent] + [each for each in commands if each.here]
-    lately = [each for action in recent for each in commands if each.action == action and each not in urgent]
-    return [*urgent, *lately, *(each for each in commands if each not in urgent and each not in lately)]
+    urgent = [command for command in commands if command.urgent] + [command for command in commands if command.here]
+    lately = [
+        command for action in recent for command in commands if command.action == action and command not in urgent
+    ]
+    return [*urgent, *lately, *(command for command in commands if command not in urgent and command not in lately)]
 
 
 def all_commands(
@@ -55,68 +57,70 @@ def all_commands(
     keys: Keymap,
     switches: Mapping[str, bool],
     sheet: str = "",
-) -> Iterator[Command]:
+) -> Iterator[PaletteCommand]:
     """Each function, the most urgent first; those of the page in front come next. `switches`: what is on."""
-    yield Command("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)
+    yield PaletteCommand("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)
     if session.latched:
-        yield Command("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
+        yield PaletteCommand("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
     if session.recording:
-        yield Command("End recording", f"keep {session.recording}", "act.record", "/record stop", urgent=True)
+        yield PaletteCommand("End recording", f"keep {session.recording}", "act.record", "/record stop", urgent=True)
     for key in SHEETS[sheet].keys if sheet else ():
         if key.word and key.action and " / " not in key.action and ".." not in key.keys:
-            yield Command(key.word.capitalize(), key.about, key.action, key.shown, here=True)
+            yield PaletteCommand(key.word.capitalize(), key.about, key.action, key.shown, here=True)
     if not session.recording:
-        yield Command("Record a macro", "what is typed from now on", "act.record", "/record NAME")
+        yield PaletteCommand("Record a macro", "what is typed from now on", "act.record", "/record NAME")
     log = "End the log" if session.log is not None else "Begin a log"
     about = (
         f"of this session: {session.log.path}" if session.log is not None else "of this session, in the state folder"
     )
-    yield Command(log, about, "act.log", keys.shown("log") or "/log")
+    yield PaletteCommand(log, about, "act.log", keys.shown("log") or "/log")
     for page in PAGES:
-        yield Command(page.title, page.about, _call("act.page", page.name), keys.shown(f"page-{page.name}"))
+        yield PaletteCommand(page.title, page.about, _call("act.page", page.name), keys.shown(f"page-{page.name}"))
     for panel in PANELS:
         title = f"Panel {panel.name} on or off"
-        yield Command(title, panel.about, _call("act.panel", panel.name), keys.shown(f"panel-{panel.name}"))
+        yield PaletteCommand(title, panel.about, _call("act.panel", panel.name), keys.shown(f"panel-{panel.name}"))
     yield from _choices(session, macros, keys)
-    for each in added():
-        if title := each.title(session):
-            yield Command(title, each.meaning, _call("act.switch", each.name), keys.shown(each.name))
+    for switch in added():
+        if title := switch.title(session):
+            yield PaletteCommand(title, switch.meaning, _call("act.switch", switch.name), keys.shown(switch.name))
     switched = {name: "off" if on else "on" for name, on in switches.items()}
     for row in rows(__file__, "commands.csv"):
         shown = row["key"] if row["key"].startswith("/") else keys.shown(row["key"])
-        yield Command(row["title"].format(**switched), row["about"], row["action"], shown)
+        yield PaletteCommand(row["title"].format(**switched), row["about"], row["action"], shown)
     for name, _, meaning in verbs:
-        yield Command(name, meaning, _call("act.begin_line", f"{name} "))
+        yield PaletteCommand(name, meaning, _call("act.begin_line", f"{name} "))
 
 
-def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:
+def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator[PaletteCommand]:
     """Macros, drives and buses, each by its own name."""
     keys = {name: key for key, name in macros.bound}
     for name, note in macros.names:
         key = keymap.shown(f"play-{keys[name].lower()}") if name in keys else ""
-        yield Command(f"Play {name}", note or "macro", _line(f"/play {name}"), key or f"/play {name}")
+        yield PaletteCommand(f"Play {name}", note or "macro", _line(f"/play {name}"), key or f"/play {name}")
     if macros.place:
-        yield Command(
+        yield PaletteCommand(
             "Next page of keys", f"F2 to F12; now page {macros.page}", "act.macro_page", keymap.shown("macro-page")
         )
-    yield Command("Choose a drive", "the one that plain text goes to", "act.choose_drive", keymap.shown("drive"))
+    yield PaletteCommand("Choose a drive", "the one that plain text goes to", "act.choose_drive", keymap.shown("drive"))
     for number, bus in enumerate(session.tabs.shown, 1):
         if len(session.tabs.shown) > 1:
             key = keymap.shown(f"tab-{number}")
-            yield Command(f"Show bus {bus.name}", "its transcript and drives", _call("act.select", "", bus.name), key)
+            yield PaletteCommand(
+                f"Show bus {bus.name}", "its transcript and drives", _call("act.select", "", bus.name), key
+            )
         for drive in bus.drives.values():
             title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()
-            yield Command(title, f"select it   {drive.product}", _call("act.select", drive.address, bus.name))
+            yield PaletteCommand(title, f"select it   {drive.product}", _call("act.select", drive.address, bus.name))
         if bus.name == session.selected_bus:
-            yield Command(
+            yield PaletteCommand(
                 f"Rename {bus.name}", "another name in its tab", _call("act.begin_line", "/rename "), "/rename NAME"
             )
-            yield Command(
+            yield PaletteCommand(
                 f"Keep {bus.name}", "save it as a connection", _call("act.begin_line", "/keep "), "/keep NAME"
             )
-            yield Command("Tab to the left", "one place", _line("/tab left"), keymap.shown("tab-left"))
-            yield Command("Tab to the right", "one place", _line("/tab right"), keymap.shown("tab-right"))
-        yield Command(f"Close bus {bus.name}", "moves nothing, stops nothing", _line(f"/close {bus.name}"))
+            yield PaletteCommand("Tab to the left", "one place", _line("/tab left"), keymap.shown("tab-left"))
+            yield PaletteCommand("Tab to the right", "one place", _line("/tab right"), keymap.shown("tab-right"))
+        yield PaletteCommand(f"Close bus {bus.name}", "moves nothing, stops nothing", _line(f"/close {bus.name}"))
 
 
 def _line(line: str) -> str:
@@ -127,23 +131,23 @@ def _call(name: str, *arguments: str) -> str:
     return f"{name}({', '.join(map(repr, arguments))})"
 
 
-def commands_like(commands: Sequence[Command], typed: str, width: int) -> list[Match]:
+def commands_like(commands: Sequence[PaletteCommand], typed: str, width: int) -> list[Match]:
     """The commands that hold every typed word, then those with the letters in their titles; all for an empty text."""
     words, matcher = typed.casefold().split(), Matcher(typed)
-    found: list[tuple[int, float, int]] = []
+    ranked: list[tuple[int, float, int]] = []
     for number, command in enumerate(commands):
         title, all_of_it = command.title.casefold(), f"{command.title} {command.about}".casefold()
         score = matcher.match(command.title) if words else 1.0
         if all(word in title for word in words):
-            found.append((0, -score, number))
+            ranked.append((0, -score, number))
         elif all(word in all_of_it for word in words):
-            found.append((1, -score, number))
+            ranked.append((1, -score, number))
         elif score:
-            found.append((2, -score, number))
-    return [Match(str(number), _shown(commands[number], width)) for _, _, number in sorted(found)]
+            ranked.append((2, -score, number))
+    return [Match(str(number), _shown(commands[number], width)) for _, _, number in sorted(ranked)]
 
 
-def _shown(command: Command, width: int) -> Text:
+def _shown(command: PaletteCommand, width: int) -> Text:
     """Title, meaning, and the key at the right."""
     title = fit(visible(command.title), max(TITLE, len(command.title)))
     room = width - len(title) - len(command.key) - (4 if command.key else 2)
@@ -159,26 +163,30 @@ KEY = 15
 
 def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
     """All help for a page or a box: what it is for, its keys in groups, the pages that are near, and the rest."""
-    found: list[Entry] = [(SHEETS[sheet].title.capitalize(), ""), ("", SHEETS[sheet].about)]
+    listed: list[Entry] = [(SHEETS[sheet].title.capitalize(), ""), ("", SHEETS[sheet].about)]
     groups = all_groups(sheet)
     near = groups.pop("Pages", [])
     for group, of_group in groups.items():
-        found.append((group, ""))
-        for each in of_group:
-            if each.keys:
-                found.append((keys.shown(each.name) if each.name else each.shown, each.about))
-            elif not each.name:
-                found.append(("^P", f"{each.word}: {each.about}"))
+        listed.append((group, ""))
+        for key in of_group:
+            if key.keys:
+                listed.append((keys.shown(key.name) if key.name else key.shown, key.about))
+            elif not key.name:
+                listed.append(("^P", f"{key.word}: {key.about}"))
     if near:
         here = f"page-{sheet}"
-        found.append(("Near", ""))
-        found += [(keys.shown(each.name) or f"/page {each.name[5:]}", each.about) for each in near if each.name != here]
+        listed.append(("Near", ""))
+        listed += [
+            (keys.shown(command.name) or f"/page {command.name[5:]}", command.about)
+            for command in near
+            if command.name != here
+        ]
     everywhere: dict[str, list[Entry]] = {}
     for row in rows(__file__, "help.csv"):
         everywhere.setdefault(row["group"], [(row["group"], "")]).append((row["key"], row["about"]))
     played = [("Macros on keys", ""), *((key, f"plays {name}") for key, name in macros)]
     stop, *others = everywhere.values()
-    return [*found, *stop, *(played if len(played) > 1 else ()), *chain.from_iterable(others)]
+    return [*listed, *stop, *(played if len(played) > 1 else ()), *chain.from_iterable(others)]
 
 
 def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:

@@ -11,11 +11,11 @@ from collections.abc import Callable, Container, Sequence
 from typing import Any
 
 from multidrop.drives.bus import Bus
-from multidrop.drives.telemetry import Subscription, Telemetry, Value
+from multidrop.drives.telemetry import DriveValue, Subscription, Telemetry
 from multidrop.shell.roles import Series
 from multidrop.shell.session import Session
 from multidrop.tui.curves.samples import PREDICTED as MEASURED
-from multidrop.tui.curves.trigger import State
+from multidrop.tui.curves.trigger import TriggerState
 from multidrop.tui.screen_model import ScreenModel
 
 PLOT = 0.02
@@ -23,9 +23,9 @@ PLOT = 0.02
 VALUES = 0.1
 """Seconds between two readings of a plotted value."""
 STATUS = 0.05
-REST = 0.5
+REST_PERIOD = 0.5
 LIVELY = 0.25
-OTHERS = 2.0
+OTHERS_PERIOD = 2.0
 CONDITIONS = 1.0
 """Seconds between two readings of the conditions of the selected drive, and of each that is plotted."""
 CONDITIONS_OF_OTHERS = 5.0
@@ -55,7 +55,7 @@ class Polling:
     def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
         chosen = list(dict.fromkeys([*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]))
-        drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
+        drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST_PERIOD) if self.on else {}
         watches = _watches(session, plotted(session)) if self.on else {}
         values = _values(session, chosen) if self.on else {}
         for (bus, _, addresses), period in drives.items():
@@ -66,23 +66,23 @@ class Polling:
                 model.bus(bus).readout(address).watched = period
         kinds = zip(BEGIN, (drives, watches, values), strict=True)
         wanted = [(begin, place, period) for begin, places in kinds for place, period in places.items()]
-        for gone in [each for each in self._held if each not in wanted]:
+        for gone in [subscription for subscription in self._held if subscription not in wanted]:
             self._held.pop(gone).close()
-        for each in wanted:
-            if each not in self._held:
-                begin, (bus, _, members), period = each
-                self._held[each] = begin(session.buses[bus].telemetry)(members, period)
+        for wanted_by in wanted:
+            if wanted_by not in self._held:
+                begin, (bus, _, members), period = wanted_by
+                self._held[wanted_by] = begin(session.buses[bus].telemetry)(members, period)
 
     def end(self) -> None:
-        for each in self._held.values():
-            each.close()
+        for subscription in self._held.values():
+            subscription.close()
         self._held.clear()
 
 
 def plotted(session: Session) -> Sequence[Series]:
     """The plotted series: those that were named, as far as they are open; else the selected drive."""
-    named = [each for each in session.plotted if each.bus in session.buses]
-    named = [each for each in named if each.address in session.buses[each.bus].drives]
+    named = [series for series in session.plotted if series.bus in session.buses]
+    named = [series for series in named if series.address in session.buses[series.bus].drives]
     if named or session.selected is None:
         return named
     return [Series(session.selected_bus, session.selected.address)]
@@ -101,7 +101,7 @@ def moved_lately(session: Session, model: ScreenModel, since: float) -> Sequence
 def _awaited(session: Session, model: ScreenModel) -> list[Series]:
     """What a trigger waits for: it is read as what is plotted, also while another page is shown."""
     trigger = model.look.trigger
-    if trigger.setting is None or trigger.state in (State.OFF, State.HELD):
+    if trigger.setting is None or trigger.state in (TriggerState.OFF, TriggerState.HELD):
         return []
     bus, address, _, word = trigger.setting.quantity
     there = bus in session.buses and address in session.buses[bus].drives
@@ -117,13 +117,13 @@ def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], res
     wanted: Wanted = {}
     for bus in _open(session):
         chosen = session.selected.address if bus.name == session.selected_bus and session.selected is not None else None
-        fast = {each.address for each in plotted if each.bus == bus.name and each.of_motion}
+        fast = {series.address for series in plotted if series.bus == bus.name and series.of_motion}
         by_period: dict[float, list[str]] = {}
         for address in bus.drives:
             busy = model.bus(bus.name).readout(address).busy(session.now())
             shown = address == chosen or address in fast
             moving = PLOT if address in fast else STATUS if address == chosen else LIVELY
-            still = rest if address in fast else REST if shown else OTHERS
+            still = rest if address in fast else REST_PERIOD if shown else OTHERS_PERIOD
             by_period.setdefault(moving if busy else still, []).append(address)
         for period, addresses in by_period.items():
             wanted[bus.name, id(bus), tuple(addresses)] = period
@@ -138,7 +138,7 @@ def _watches(session: Session, plotted: Sequence[Series]) -> Wanted:
     wanted: Wanted = {}
     for bus in _open(session):
         here, chosen = bus.name == session.selected_bus, session.selected
-        named = {each.address for each in plotted if each.bus == bus.name}
+        named = {series.address for series in plotted if series.bus == bus.name}
         named |= {chosen.address} if here and chosen is not None else set()
         for address in bus.drives:
             if address in named:
@@ -153,7 +153,9 @@ def _values(session: Session, plotted: Sequence[Series]) -> Wanted:
     wanted: Wanted = {}
     for bus in _open(session):
         values = tuple(
-            Value(each.address, each.word) for each in plotted if each.bus == bus.name and not each.of_motion
+            DriveValue(series.address, series.word)
+            for series in plotted
+            if series.bus == bus.name and not series.of_motion
         )
         if values:
             wanted[bus.name, id(bus), values] = VALUES

@@ -15,7 +15,7 @@ from multidrop.tui.panels.drives import narrow_rows
 from multidrop.tui.panels.table import column_rows
 from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.purpose import Purpose
-from multidrop.tui.readout import State
+from multidrop.tui.readout import ReadoutState
 from multidrop.tui.screen_model import BusFacts, Record, ScreenModel, bus_old, bus_state
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Page
@@ -70,7 +70,7 @@ class Presenter:
         tabs: list[Tab] = []
         for number, bus in enumerate(self.session.tabs.shown, 1):
             facts, drives, lost = self.model.buses.get(bus.name), list(bus.drives), self.session.tabs.missing(bus)
-            state = State.SILENT if bus.silent and not lost else bus_state(facts, drives, lost)
+            state = ReadoutState.SILENT if bus.silent and not lost else bus_state(facts, drives, lost)
             selected, old = bus.name == self.session.selected_bus, bus_old(facts, drives, now)
             tabs.append(Tab(number, bus.name, state, selected, old, trouble_mark(facts, drives, lost)))
         return tabs
@@ -197,11 +197,11 @@ def _trouble_row(text: str) -> Row:
 
 def trouble_mark(facts: BusFacts | None, addresses: Sequence[str], lost: bool) -> str:
     """The mark of a tab whose bus has trouble that its state does not show."""
-    if facts is None or lost or bus_state(facts, list(addresses), lost) in (State.TROUBLE, State.DIFFERS):
+    if facts is None or lost or bus_state(facts, list(addresses), lost) in (ReadoutState.TROUBLE, ReadoutState.DIFFERS):
         return ""
     readouts = [facts.readout(address) for address in addresses]
-    if any(each.silent_since is not None for each in readouts):
-        return "" if bus_state(facts, list(addresses), lost) is State.SILENT else "?"
-    if any(trouble_of(axis) for each in readouts for axis in each.axes):
+    if any(readout.silent_since is not None for readout in readouts):
+        return "" if bus_state(facts, list(addresses), lost) is ReadoutState.SILENT else "?"
+    if any(trouble_of(axis) for readout in readouts for axis in readout.axes):
         return "!"
-    return State.DIFFERS.sign if any(each.differs for each in readouts) else ""
+    return ReadoutState.DIFFERS.sign if any(readout.differs for readout in readouts) else ""

@@ -18,7 +18,7 @@ from multidrop.tui.text import age
 
 SPAN = 20.0
 """Seconds of samples that the plot keeps."""
-SHORTEST = 0.25
+SHORTEST_PERIOD = 0.25
 """Seconds below which no value counts as old, however fast it is polled: people cannot read faster."""
 SWITCHES = ("lim-", "lim+")
 """Functions of lamps that end the travel."""
@@ -30,7 +30,7 @@ LIVELY = 3.0
 """Seconds of faster polling after a line was sent to a drive."""
 
 
-class State(Enum):
+class ReadoutState(Enum):
     """The state of a drive or a bus: a sign, a word, a role."""
 
     UNKNOWN = ("·", "open", "dim")
@@ -55,11 +55,11 @@ class State(Enum):
         self.sign, self.word, self.role = sign, word, role
 
 
-READ = (State.MOVING, State.STOPPED, State.DWELL, State.NO_CURRENT)
+READ = (ReadoutState.MOVING, ReadoutState.STOPPED, ReadoutState.DWELL, ReadoutState.NO_CURRENT)
 """The states that were read of a drive, which can be outdated."""
 
 
-class Point(NamedTuple):
+class PlottedPoint(NamedTuple):
     """A sample as plotted."""
 
     at: float
@@ -76,7 +76,7 @@ class Travelled:
     at_switch: dict[str, int] = field(default_factory=dict)
     """By the function of the switch: `lim+` and `lim-`."""
 
-    def reach(self, sample: Sample, before: Point | None, pace: Pace | None) -> None:
+    def reach(self, sample: Sample, before: PlottedPoint | None, pace: Pace | None) -> None:
         """Take a position; forget all earlier ones if the drive cannot have moved there, so it counts otherwise now."""
         position = sample.position
         if before is not None and pace is not None and sample.velocity == before.velocity == 0:
@@ -125,14 +125,14 @@ class ProgramFacts:
 
 
 @dataclass
-class Beside:
+class TwinReadout:
     """The twin of an axis: its last prediction, and since when the two are apart."""
 
     predicted: Predicted | None = None
     diverged: Diverged | None = None
     """None: they agree."""
 
-    def behind(self, last: Point | None) -> bool:
+    def behind(self, last: PlottedPoint | None) -> bool:
         """True if the samples have gone on without predictions."""
         return self.predicted is not None and last is not None and last.at - self.predicted.at > BEHIND
 
@@ -148,7 +148,7 @@ class Beside:
 class Readout:
     """The values read from one drive, and their times."""
 
-    last: Point | None = None
+    last: PlottedPoint | None = None
     silent_since: float | None = None
     touched: float = -math.inf
     """Time when a line was last sent to the drive: earlier values may be outdated."""
@@ -162,7 +162,7 @@ class Readout:
     """Time at which an axis was last read in motion."""
     period: float = 0.0
     """Seconds between the requested polls; 0: as fast as the wire allows."""
-    points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
+    points: deque[PlottedPoint] = field(default_factory=lambda: deque(maxlen=4096))
     axis: str = ""
     """The axis of these values; empty if the drive has only one."""
     trouble: str = ""
@@ -179,7 +179,7 @@ class Readout:
     settings: Readings | None = None
     """Every setting, as last read in this session."""
     settings_at: float = -math.inf
-    twin: Beside | None = None
+    twin: TwinReadout | None = None
     """The twin of this axis; None: none runs."""
     figures: Figures = NATIVE
     """The form in which its numbers are shown."""
@@ -191,8 +191,8 @@ class Readout:
 
     def show_in(self, figures: Callable[[str], Figures]) -> None:
         """Show the numbers of each axis, by its name, in these figures from now on."""
-        for each in self.axes:
-            each.figures = figures(each.axis)
+        for axis in self.axes:
+            axis.figures = figures(axis.axis)
 
     def take(self, sample: Sample) -> None:
         """Take the reply to a poll. The axis of the first sample becomes the first axis."""
@@ -210,7 +210,7 @@ class Readout:
         self.trouble = sample.trouble
         before, pace = self.last, self.conditions.pace if self.conditions is not None else None
         self.travel.reach(sample, before, pace)
-        self.last = Point(sample.at, sample.position, sample.velocity)
+        self.last = PlottedPoint(sample.at, sample.position, sample.velocity)
         self.silent_since = None
         self.points.append(self.last)
         while self.points[0].at < sample.at - SPAN - 2:
@@ -228,13 +228,13 @@ class Readout:
     def condition(self, at: float, conditions: Sequence[Conditions]) -> None:
         """Take the conditions of every axis; those of the first one are this readout's."""
         runs = next((each.runs for each in conditions if each.runs is not None), None)
-        for number, each in enumerate(conditions):
-            axis = self if number == 0 else self.others.setdefault(each.axis, Readout(axis=each.axis))
-            axis.conditions, axis.conditioned_at, axis.watched = each, at, self.watched
+        for number, condition in enumerate(conditions):
+            axis = self if number == 0 else self.others.setdefault(condition.axis, Readout(axis=condition.axis))
+            axis.conditions, axis.conditioned_at, axis.watched = condition, at, self.watched
             if runs is not None:
-                axis.program.name, axis.program.ran, axis.program.known_at = each.program, runs, at
+                axis.program.name, axis.program.ran, axis.program.known_at = condition.program, runs, at
             if axis.last is not None and axis.last.velocity == 0:
-                axis.travel.learn(each, axis.last.position)
+                axis.travel.learn(condition, axis.last.position)
 
     def recurs(self, event: Conditioned) -> bool:
         """True if conditions say what those before said, which were not outdated yet."""
@@ -258,7 +258,7 @@ class Readout:
         if self.last is None and self.twin is None:
             self.axis = event.axis  # a prediction that comes before its sample
         axis = self if event.axis == self.axis else self.others.setdefault(event.axis, Readout(axis=event.axis))
-        axis.twin = axis.twin or Beside()
+        axis.twin = axis.twin or TwinReadout()
         axis.twin.take(event)
 
     def predicted(self, event: Predicted) -> bool:
@@ -277,7 +277,7 @@ class Readout:
         """True if the last value is older than twice its period, or than a line that may have changed it."""
         if self.last is None:
             return True
-        return now - self.last.at > 2 * max(self.period, SHORTEST) or self.overtaken(now)
+        return now - self.last.at > 2 * max(self.period, SHORTEST_PERIOD) or self.overtaken(now)
 
     @property
     def stopped_since(self) -> bool:
@@ -286,7 +286,7 @@ class Readout:
 
     def overtaken(self, now: float) -> bool:
         """True if a line was sent after the last value was read, and the next value is not about to arrive."""
-        return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST
+        return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST_PERIOD
 
     def aged(self, now: float) -> bool:
         return self._aged(self.conditioned_at, now)
@@ -316,12 +316,12 @@ class Readout:
         return self.conditions.no_current if self.conditions is not None else ""
 
     @property
-    def own_state(self) -> State:
+    def own_state(self) -> ReadoutState:
         if self.last is not None and self.last.velocity != 0:
-            return State.MOVING
+            return ReadoutState.MOVING
         if self.program.runs and not (self.conditions is not None and self.conditions.disabled):
-            return State.DWELL
-        return State.NO_CURRENT if self.no_current else State.STOPPED
+            return ReadoutState.DWELL
+        return ReadoutState.NO_CURRENT if self.no_current else ReadoutState.STOPPED
 
     @property
     def _moves(self) -> bool:
@@ -330,25 +330,25 @@ class Readout:
     def rate(self, now: float) -> float:
         return sum(1 for _ in takewhile(lambda point: point.at >= now - 2, reversed(self.points))) / 2
 
-    def state(self, *, storing: bool = False) -> State:
+    def state(self, *, storing: bool = False) -> ReadoutState:
         if storing:
-            return State.STORING
+            return ReadoutState.STORING
         if self.silent_since is not None:
-            return State.SILENT
+            return ReadoutState.SILENT
         if self.last is None:
-            return State.UNKNOWN
+            return ReadoutState.UNKNOWN
         if self._moves:
-            return State.MOVING
+            return ReadoutState.MOVING
         states = [each.own_state for each in self.axes]
-        return State.NO_CURRENT if State.NO_CURRENT in states else states[0]
+        return ReadoutState.NO_CURRENT if ReadoutState.NO_CURRENT in states else states[0]
 
     def words(self, now: float, *, storing: bool = False) -> str:
         """The state in words, with its duration, or with its age if it may be outdated."""
         state = self.state(storing=storing)
-        if state is State.SILENT and self.silent_since is not None:
+        if state is ReadoutState.SILENT and self.silent_since is not None:
             return f"silent {age(now - self.silent_since)}"
-        if state is State.UNKNOWN:
+        if state is ReadoutState.UNKNOWN:
             return "not read yet"
         if state in READ and self.last is not None and self.old(now):
-            return f"{'moving' if state is State.MOVING else 'at rest'} {age(now - self.last.at)} ago"
+            return f"{'moving' if state is ReadoutState.MOVING else 'at rest'} {age(now - self.last.at)} ago"
         return state.word

@@ -19,10 +19,10 @@ from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
 from multidrop.shell import events
 from multidrop.shell.line_syntax import EVERYONE
-from multidrop.tui.curves.chart import Look
+from multidrop.tui.curves.chart import ChartView
 from multidrop.tui.curves.samples import Traces
 from multidrop.tui.figures import NATIVE, Figures
-from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.readout import READ, Readout, ReadoutState
 
 # Changes of a drive between two readings, in words: a limit, an error, the end of a program, silence.
 #
@@ -46,7 +46,7 @@ class Happening(NamedTuple):
 
 SILENT = Happening("no reply to polls", warning=True)
 BACK = Happening("polls get a reply again")
-LATE = 2.5
+LATE_AFTER = 2.5
 """Seconds between two readings after which a change between them has no single time, and no place."""
 Between = Callable[[float, float], str]
 """Makes words of two times: ` (between 12:00:01 and 12:00:21)`."""
@@ -68,14 +68,14 @@ def changes_of(
         axis = next((each for each in known.axes if each.axis == event.axis), None)
         if axis is not None and axis.last is not None and axis.trouble != event.trouble:
             text = event.trouble or f"cleared: {axis.trouble}"
-            when = between(axis.last.at, event.at) if event.at - axis.last.at > LATE else ""
+            when = between(axis.last.at, event.at) if event.at - axis.last.at > LATE_AFTER else ""
             yield Happening(_named(text, event.axis) + when, warning=bool(event.trouble))
     else:
         for each, after in zip(known.axes, event.conditions, strict=False):
-            late = each.conditions is not None and event.at - each.conditioned_at > LATE
+            late = each.conditions is not None and event.at - each.conditioned_at > LATE_AFTER
             when = between(each.conditioned_at, event.at) if late else ""
-            for found in _conditioned(each, after, known.failed_at, late):
-                yield found._replace(text=found.text + when)
+            for happening in _conditioned(each, after, known.failed_at, late):
+                yield happening._replace(text=happening.text + when)
 
 
 def _conditioned(known: Readout, after: Conditions, failed_at: float, late: bool) -> Iterator[Happening]:
@@ -117,17 +117,17 @@ def _named(text: str, axis: str) -> str:
     return f"{axis}: {text}" if axis else text
 
 
-MOST = 4000
+MOST_PIECES = 4000
 """Pieces that are kept."""
 MOST_BYTES = 256 * 1024
 """Bytes that are kept."""
-GAP = 0.02
+JOINED_WITHIN = 0.02
 """Seconds without a byte after which a received line is not continued: a slow line delivers single bytes."""
-LONGEST = 256
+MOST_JOINED_BYTES = 256
 """Bytes of one piece that is continued."""
 
 
-class Piece(NamedTuple):
+class TrafficPiece(NamedTuple):
     """Bytes that were written or read at once. `poll`: a request of ours that was not typed, or its reply."""
 
     at: float
@@ -141,7 +141,7 @@ class TrafficStore:
     """The last pieces of one bus. `taken` counts all of them."""
 
     def __init__(self) -> None:
-        self.pieces: deque[Piece] = deque(maxlen=MOST)
+        self.pieces: deque[TrafficPiece] = deque(maxlen=MOST_PIECES)
         self.taken = 0
         self._bytes = 0
         self._last_at = 0.0
@@ -158,17 +158,17 @@ class TrafficStore:
             poll = request is not None and request.priority is Priority.POLL
             address = request.address if request is not None else ""
             self._bytes += min(len(event.data), MOST_BYTES)
-            while self.pieces and (len(self.pieces) == MOST or self._bytes > MOST_BYTES):
+            while self.pieces and (len(self.pieces) == MOST_PIECES or self._bytes > MOST_BYTES):
                 self._bytes -= len(self.pieces.popleft().data)
-            piece = Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
+            piece = TrafficPiece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
             last = self.pieces[-1] if self.pieces else None
             if (
                 last is not None
                 and not piece.outgoing
                 and (last.outgoing, last.address, last.poll) == (False, piece.address, piece.poll)
                 and not last.data.endswith(b"\n")
-                and len(last.data) < LONGEST
-                and piece.at - self._last_at < GAP
+                and len(last.data) < MOST_JOINED_BYTES
+                and piece.at - self._last_at < JOINED_WITHIN
             ):
                 last = self.pieces.pop()
                 piece = last._replace(data=last.data + piece.data)
@@ -187,7 +187,7 @@ class TrafficStore:
 
 VERBS = "refused|replied|does|did|is|has|had|holds|cannot|moves"
 """Words after the name of a drive; without one of them, `a` is an article."""
-KEPT = 50_000
+MOST_FRESH_RECORDS = 50_000
 """Records that a transcript keeps."""
 
 
@@ -213,7 +213,7 @@ class Record(NamedTuple):
 class BusFacts:
     """The records and values of one bus."""
 
-    fresh: deque[Record] = field(default_factory=lambda: deque(maxlen=KEPT))
+    fresh: deque[Record] = field(default_factory=lambda: deque(maxlen=MOST_FRESH_RECORDS))
     """Records that no transcript has taken yet."""
     readouts: dict[str, Readout] = field(default_factory=dict)
     traffic: TrafficStore = field(default_factory=TrafficStore)
@@ -242,7 +242,7 @@ class ScreenModel:
         """Returns the name that a person gave to a drive: of a bus, an address."""
         self._between = between
         self.buses: dict[str, BusFacts] = {}
-        self.traces, self.look = Traces(), Look()
+        self.traces, self.look = Traces(), ChartView()
         """The plotted samples, and how a person looks at them."""
         self.changed = True
         """Buses, drives, selection or latch may have changed."""
@@ -362,9 +362,9 @@ class ScreenModel:
             readout.show_in(partial(self.figures, event.bus, inner.address))
             happened = list(changes_of(readout, inner, self._between))
             readout.note(inner)
-            for each in happened:
-                mark = "!" if each.warning else "."
-                self._of_drive(event.bus, Record(inner.at, inner.address, mark, each.text, help=each.help))
+            for happening in happened:
+                mark = "!" if happening.warning else "."
+                self._of_drive(event.bus, Record(inner.at, inner.address, mark, happening.text, help=happening.help))
         elif isinstance(inner, events.TwinEvent):
             if isinstance(inner, events.Predicted):
                 self.traces.predict(event.bus, inner)
@@ -375,32 +375,34 @@ class ScreenModel:
             self.page(event.bus).extend([Record(inner.at, "", "<", text, mine=False) for text in inner.lines])
 
 
-def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State:
+def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> ReadoutState:
     """The state of a whole bus as last read: idle only if every drive was read as stopped, and runs no program.
 
     What was read before a stop counts for none that is at rest: the banner says that it is not read yet.
     """
     if lost:
-        return State.LOST
+        return ReadoutState.LOST
     if facts is None or not addresses:
-        return State.UNKNOWN
+        return ReadoutState.UNKNOWN
     readouts = [facts.readout(address) for address in addresses]
-    states = [each.state() for each in readouts]
-    for telling in (State.MOVING, State.SILENT):
+    states = [readout.state() for readout in readouts]
+    for telling in (ReadoutState.MOVING, ReadoutState.SILENT):
         if telling in states:
             return telling
-    if any(each.in_trouble for each in readouts):
-        return State.TROUBLE
-    if any(each.differs for each in readouts):
-        return State.DIFFERS
-    if any(each.program.runs for each in readouts):
-        return State.DWELL
-    if any(state not in READ for state in states) or any(each.program.ran or each.stopped_since for each in readouts):
-        return State.UNKNOWN
-    return State.OFF if State.NO_CURRENT in states else State.IDLE
+    if any(readout.in_trouble for readout in readouts):
+        return ReadoutState.TROUBLE
+    if any(readout.differs for readout in readouts):
+        return ReadoutState.DIFFERS
+    if any(readout.program.runs for readout in readouts):
+        return ReadoutState.DWELL
+    if any(state not in READ for state in states) or any(
+        readout.program.ran or readout.stopped_since for readout in readouts
+    ):
+        return ReadoutState.UNKNOWN
+    return ReadoutState.OFF if ReadoutState.NO_CURRENT in states else ReadoutState.IDLE
 
 
 def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:
     """True if the state of a bus may be outdated."""
     readouts = [] if facts is None else [facts.readout(address) for address in addresses]
-    return any(each.old(now) or (each.program.runs and each.program_aged(now)) for each in readouts)
+    return any(readout.old(now) or (readout.program.runs and readout.program_aged(now)) for readout in readouts)

@@ -11,7 +11,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.text import counted, visible
 from multidrop.shell.channel import Front
 from multidrop.shell.roles import Filter, Transcripts
-from multidrop.tui.actions import Actions, Parts
+from multidrop.tui.actions import ScreenActions, ScreenParts
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record
 from multidrop.tui.widgets.transcript import MARKS
@@ -20,7 +20,7 @@ from multidrop.tui.widgets.transcript import MARKS
 class Hooks:
     """The answers of the screen to what a session asks of its front end."""
 
-    def __init__(self, parts: Parts, actions: Actions, presenter: Presenter) -> None:
+    def __init__(self, parts: ScreenParts, actions: ScreenActions, presenter: Presenter) -> None:
         self._parts, self._actions, self._presenter = parts, actions, presenter
         parts.session.front = Front(
             self._go_on,

@@ -8,14 +8,14 @@ from rich.cells import cell_len, chop_cells, set_cell_size
 
 from multidrop.base.text import visible as written_out
 
-LONGEST = 4096
+LONGEST_SHOWN_TEXT = 4096
 """Greatest number of characters shown of one line; noise without line ends has any length."""
 
 
 def visible(text: str) -> str:
     r"""Write out control and direction characters (`\x06`), and cut a line of any length."""
-    shown = written_out(text[:LONGEST])
-    return shown if len(text) <= LONGEST else f"{shown} … ({len(text)} characters)"
+    shown = written_out(text[:LONGEST_SHOWN_TEXT])
+    return shown if len(text) <= LONGEST_SHOWN_TEXT else f"{shown} … ({len(text)} characters)"
 
 
 def digits(value: int | None) -> str:
@@ -104,4 +104,4 @@ def key_words(key: str) -> str:
     *modifiers, name = key.split("+")
     short = {"pageup": "PgUp", "pagedown": "PgDn"}.get(name, name.capitalize())
     shown = name.upper() if len(name) == 1 or name[1:].isdigit() else short
-    return "".join("^" if each == "ctrl" else f"{each.capitalize()}+" for each in modifiers) + shown
+    return "".join("^" if modifier == "ctrl" else f"{modifier.capitalize()}+" for modifier in modifiers) + shown

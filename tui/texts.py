@@ -68,8 +68,8 @@ class Texts:
         """A copy of an earlier session that differs from the file; None without one."""
         if self._drafts is None or text.changed or text.kept is not None:
             return None
-        found = self._drafts.find(text.name)
-        return found if found is not None and found.text != real_text(text.text) else None
+        draft = self._drafts.find(text.name)
+        return draft if draft is not None and draft.text != real_text(text.text) else None
 
     def overtaken(self, text: OpenText, draft: Copy) -> bool:
         """True if the file has changed since the copy was made of it."""
@@ -104,7 +104,7 @@ class Texts:
 
     def close(self, text: OpenText) -> None:
         self.drop_draft(text)
-        self._open = {place: each for place, each in self._open.items() if each is not text}
+        self._open = {place: open_text for place, open_text in self._open.items() if open_text is not text}
         self.current = None if self.current is text else self.current
 
     def flush(self) -> list[str]:

@@ -17,11 +17,11 @@ from multidrop.tui.widgets.lines import Row
 
 LINE = "press"
 """The line of the demo cell that it is on."""
-ROWS = 3
+TOUR_ROWS = 3
 """Height of the tour: its step in words, and how to end it."""
 
 
-class Step(NamedTuple):
+class TourStep(NamedTuple):
     """A task, and what ends it. `{NAME}` is replaced by the key of a function."""
 
     words: str
@@ -30,19 +30,21 @@ class Step(NamedTuple):
 
 
 STEPS = (
-    Step("Drive a answers in its own language. Type PR P and press Enter: it prints its position.", "typed PR P"),
-    Step("Now a move: type MR 512000 and press Enter. Its row shows the travel and what is left of it.", "typed MR"),
-    Step("Another drive of the same line: @b PR P goes to drive b, whatever is selected.", "typed @B"),
-    Step("{page-drives} shows all drives of all lines, the worst first.", "shown AllDrives"),
-    Step("Escape goes back from every page.", "shown MainScreen"),
-    Step("Let drive a run without end: SL 100000 and Enter.", "typed SL"),
-    Step("^X stops every drive, macro and script, from anywhere, always. Press it now.", "stopped"),
-    Step(
+    TourStep("Drive a answers in its own language. Type PR P and press Enter: it prints its position.", "typed PR P"),
+    TourStep(
+        "Now a move: type MR 512000 and press Enter. Its row shows the travel and what is left of it.", "typed MR"
+    ),
+    TourStep("Another drive of the same line: @b PR P goes to drive b, whatever is selected.", "typed @B"),
+    TourStep("{page-drives} shows all drives of all lines, the worst first.", "shown AllDrives"),
+    TourStep("Escape goes back from every page.", "shown MainScreen"),
+    TourStep("Let drive a run without end: SL 100000 and Enter.", "typed SL"),
+    TourStep("^X stops every drive, macro and script, from anywhere, always. Press it now.", "stopped"),
+    TourStep(
         "STOPPED below the tabs means: velocity 0 was read from every drive. Macros and scripts wait: type /resume.",
         "resumed",
     ),
-    Step("{palette} finds everything by name. Open it, look, and close it with Escape.", "shown Everything"),
-    Step("{help} is help for where you are. Open it and type a word, then Escape.", "shown Help"),
+    TourStep("{palette} finds everything by name. Open it, look, and close it with Escape.", "shown Everything"),
+    TourStep("{help} is help for where you are. Open it and type a word, then Escape.", "shown Help"),
 )
 END = "That was the tour. The demo cell stays open; /close closes a line. Escape ends the tour."
 
@@ -104,7 +106,7 @@ class Tour:
         """The step in words; goes on to the next one once it was done."""
         if self.on and self._at < len(STEPS) and self._is_done(STEPS[self._at].until):
             self._next(self._at + 1)
-        words = [f" {row}" for row in at_words(self._words(), width - 2)][: ROWS - 1]
+        words = [f" {row}" for row in at_words(self._words(), width - 2)][: TOUR_ROWS - 1]
         last = f" tour {min(self._at + 1, len(STEPS))} of {len(STEPS)}   Esc ends it"
         rows: list[Row] = [((row, "strong"),) for row in words]
         return [*rows, ((last, "dim"),)]

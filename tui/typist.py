@@ -22,9 +22,9 @@ from multidrop.tui.assist import Assist
 from multidrop.tui.outbox import Outbox, not_sent
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.questions import Questions
+from multidrop.tui.screens.questions import ScreenQuestions
 from multidrop.tui.terminal.keyboard import Keyboard
-from multidrop.tui.widgets.entry import LONGEST
+from multidrop.tui.widgets.entry import LONGEST_COMPLETED_LINE
 from multidrop.tui.widgets.lines import Row
 
 
@@ -106,7 +106,7 @@ class Selection:
         self.follow()
 
 
-KEPT = 20
+MOST_KEPT_LINES = 20
 """Greatest number of lines that go into the history of those that a stop dropped before their Enter counted."""
 NOT_TEXT = r"[^\t\r\n -~\xa0-\U0010ffff]"
 """A key that is not text."""
@@ -165,7 +165,7 @@ class Unsent:
         plain = [re.split(NOT_TEXT, text)[0] for text in [self._half + cut[0], *cut[1:]]]
         lines = [line.strip() for text in plain for line in split_lines(text) if line.strip()]
         self._half = ""
-        for line in lines[-KEPT:]:
+        for line in lines[-MOST_KEPT_LINES:]:
             self._keep(line)
         if lines:
             self._warn(f"stopped; {not_sent(lines)}")
@@ -188,12 +188,12 @@ class Typist:
     _selection: Selection
     _unsent: Unsent
     _keyboard: Keyboard
-    _questions: Questions
+    _questions: ScreenQuestions
     _meaning: str = ""
 
     def edited(self) -> None:
         text = self._main.entry.value
-        self._meaning = self._assist.hint(text) if len(text) <= LONGEST else ""
+        self._meaning = self._assist.hint(text) if len(text) <= LONGEST_COMPLETED_LINE else ""
         self.show_hint()
         self._main.show_menu()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from multidrop.base.feature import Feature
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
-from multidrop.families.lexium.scheme import Modbus
+from multidrop.families.lexium.scheme import ModbusScheme
 from multidrop.shell.operations.operation import Examples
 from multidrop.simulator.declared import Demo, Simulated
 
@@ -36,7 +36,7 @@ FAMILY = Feature(
             own_port="modbus",
         ),
         Demo(f"{HERE}.simulator"),
-        Modbus(),
+        ModbusScheme(),
         Examples("program convert", ("program convert shuttle.mxt --to lexium -o shuttle-lmd.mxt",)),
         Examples("rescue", ("rescue COM3 --baud 9600 --dialect mcode",)),
     ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from multidrop.shell.connect.schemes import Tcp
 
 
-class Modbus(Tcp):
+class ModbusScheme(Tcp):
     """The registers of a drive with Ethernet, over a stream of bytes."""
 
     name, prefix, example = "modbus", "modbus://", "modbus://HOST:502"

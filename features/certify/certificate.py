@@ -48,7 +48,7 @@ _VALUE = re.compile(r"\{([A-Z]\w*|\d+, \d+)([+-]\d+)?\}", re.ASCII)
 
 
 @dataclass
-class Report:
+class CertifyReport:
     """The answers of one drive, one for each line that was sent, and why other questions were not asked."""
 
     drive: dict[str, str]
@@ -67,12 +67,12 @@ class Report:
         document["answers"] = self.answers
         document["other_than_ruled"] = {"questions": self.unlike}
         document["not_asked"] = {
-            why: [name for name, each in self.unasked.items() if each == why] for why in self.unasked.values()
+            why: [name for name, reason in self.unasked.items() if reason == why] for why in self.unasked.values()
         }
         return escaped_toml(tomlkit.dumps(document))
 
 
-def load(path: str) -> Report:
+def load(path: str) -> CertifyReport:
     """Read a report. Raises Diagnostic."""
     tables = toml_of(text_of(path), path)
     drive, answers = tables.get("drive"), tables.get("answers")
@@ -97,7 +97,7 @@ def load(path: str) -> Report:
     for name in unlike:
         if name not in answers:
             raise Diagnostic(f"names {name}, which has no answer", f"{path}: [other_than_ruled] questions", WRITES)
-    return Report(dict(drive), dict(answers), list(unlike))
+    return CertifyReport(dict(drive), dict(answers), list(unlike))
 
 
 def _check_keys(table: Mapping[str, Any], valid: Sequence[str], where: str) -> None:
@@ -107,18 +107,18 @@ def _check_keys(table: Mapping[str, Any], valid: Sequence[str], where: str) -> N
 
 
 def _check_texts(found: Any, where: str, least: int = 1) -> None:
-    if not (isinstance(found, list) and len(found) >= least and all(isinstance(each, str) for each in found)):
+    if not (isinstance(found, list) and len(found) >= least and all(isinstance(text, str) for text in found)):
         raise Diagnostic("must be a list of texts", where, WRITES)
 
 
-def _check_answers(questions: Sequence[Question], theirs: Report, file: str) -> None:
+def _check_answers(questions: Sequence[Question], theirs: CertifyReport, file: str) -> None:
     """Check that a report has one answer for each line of its questions. Raises Diagnostic."""
-    for each in questions:
-        found = theirs.answers.get(each.name, [])
-        most = 1 if each.shows == FITS and found == [AS_RULED] else len(each.lines)
-        if found and len(found) != most:
-            what = f"has {counted(len(found), 'text')}, and the question has {counted(most, 'line')}"
-            raise Diagnostic(what, f"{file}: [answers] {each.name}", WRITES)
+    for question in questions:
+        their_answers = theirs.answers.get(question.name, [])
+        most = 1 if question.shows == FITS and their_answers == [AS_RULED] else len(question.lines)
+        if their_answers and len(their_answers) != most:
+            what = f"has {counted(len(their_answers), 'text')}, and the question has {counted(most, 'line')}"
+            raise Diagnostic(what, f"{file}: [answers] {question.name}", WRITES)
 
 
 async def certify(session: Session, drive: Drive, file: str) -> None:
@@ -130,16 +130,16 @@ async def certify(session: Session, drive: Drive, file: str) -> None:
     finally:
         if asking.report.answers:
             _write(session, asking.report, file)
-    found, who = asking.report, session.display_name(drive)
-    others = f"; {len(found.unlike)} not as our rulings have it: {', '.join(found.unlike)}" if found.unlike else ""
-    counts = f"{counted(len(found.answers), 'question')} answered, {len(found.unasked)} not asked"
+    report, who = asking.report, session.display_name(drive)
+    others = f"; {len(report.unlike)} not as our rulings have it: {', '.join(report.unlike)}" if report.unlike else ""
+    counts = f"{counted(len(report.answers), 'question')} answered, {len(report.unasked)} not asked"
     session.notify(f"{who}: {counts}{others}{new_file.place(file)}", outcome=True)
-    for reason in dict.fromkeys(found.unasked.values()):
-        count = sum(each == reason for each in found.unasked.values())
+    for reason in dict.fromkeys(report.unasked.values()):
+        count = sum(each == reason for each in report.unasked.values())
         session.notify(f"{who}: {count} not asked: {reason}", warning=True)
 
 
-def _write(session: Session, report: Report, file: str) -> None:
+def _write(session: Session, report: CertifyReport, file: str) -> None:
     """Write a report; onto standard output where the disk takes no file, as the drive was asked. Raises Diagnostic."""
     try:
         new_file.write(file, report.text(), session.output)
@@ -148,7 +148,7 @@ def _write(session: Session, report: Report, file: str) -> None:
         raise
 
 
-async def compare(session: Session, drive: Drive, file: str, theirs: Report) -> bool:
+async def compare(session: Session, drive: Drive, file: str, theirs: CertifyReport) -> bool:
     """Put the questions of a report to a drive, and print where its answers differ; whether they do.
 
     `theirs`: the report, as it was read from the file. An answer of it that cannot be compared counts as a difference.
@@ -176,7 +176,7 @@ async def compare(session: Session, drive: Drive, file: str, theirs: Report) -> 
 
 
 def _shown(answers: Sequence[str]) -> str:
-    return " // ".join(each.encode("unicode_escape").decode() for each in answers)
+    return " // ".join(answer.encode("unicode_escape").decode() for answer in answers)
 
 
 class Asking:
@@ -184,22 +184,22 @@ class Asking:
 
     def __init__(self, session: Session, drive: Drive) -> None:
         self._session, self._drive, self._who = session, drive, session.display_name(drive)
-        found = drive.family.certifying
-        if found is None:
+        certifying = drive.family.certifying
+        if certifying is None:
             raise Diagnostic(f"no questions are known for drives of {drive.family.name}", self._who)
         state = drive.state
         if not state.product:  # what is owed to a drive is kept by what the drive is
             refuse_stranger(self._drive.state, self._who)
             raise NoAnswer(f"{self._who} was not found on this line; check its name, or give drives=NAMES in the URL")
         known = {"family": drive.family.name, "product": state.product, "version": state.version, "part": state.part}
-        known["traits"] = " ".join(sorted(found.traits()))
-        self.report = Report({key: text for key, text in known.items() if text})
+        known["traits"] = " ".join(sorted(certifying.traits()))
+        self.report = CertifyReport({key: text for key, text in known.items() if text})
 
     @property
     def _table(self) -> Certifying:
-        found = self._drive.family.certifying
-        assert found is not None
-        return found
+        certifying = self._drive.family.certifying
+        assert certifying is not None
+        return certifying
 
     @property
     def questions(self) -> list[Question]:
@@ -254,10 +254,10 @@ class Asking:
             return
         table, state, family = self._table, self._drive.state, self._drive.family
         sent = [line for line in question.lines if not line.startswith("/")]
-        if guarded := "; ".join(filter(None, (self._session.settings.guards.what(family, each) for each in sent))):
+        if guarded := "; ".join(filter(None, (self._session.settings.guards.what(family, line) for line in sent))):
             self.report.unasked[question.name] = f"the configuration guards a line of it: {guarded}"
             return
-        words = dict.fromkeys(found[1] for line in (*question.lines, question.ruled) for found in _VALUE.finditer(line))
+        words = dict.fromkeys(match[1] for line in (*question.lines, question.ruled) for match in _VALUE.finditer(line))
         try:
             values = {word: await self._value(word) for word in words}
             kept = [table.writes.format(word, await self._value(word)) for word in question.keeps]
@@ -313,7 +313,7 @@ class Asking:
 
         def note(concluded: Concluded) -> None:
             if concluded.state is drive.state:
-                taken.extend(each for each in concluded.transactions if each.request.text == line)
+                taken.extend(transaction for transaction in concluded.transactions if transaction.request.text == line)
 
         leave = session.buses[drive.link.name].witnesses.add(note)
         try:
@@ -335,7 +335,7 @@ class Asking:
         drive, (verb, *numbers) = self._drive, line.split(" ")
         registers = drive.family.registers
         if registers is not None and verb == "/register":
-            address, count = (int(each, 0) for each in numbers)
+            address, count = (int(number, 0) for number in numbers)
             return await drive.run(registers.read(address, count))
         if registers is not None and verb == "/coil":
             return await drive.run(registers.read_coil(int(numbers[0])))

@@ -12,7 +12,7 @@ from multidrop.shell.streams.stdout import StatusLine, write
 
 DIFFERS = 1
 """The exit code where a run beside the original differs."""
-SHOWN = 10
+MOST_SHOWN_WORLDS = 10
 """The largest number of worlds with a difference that are shown."""
 
 
@@ -20,10 +20,10 @@ def run(file: str, to: str, personality: str | None, output: str, until: float) 
     """Convert a file; 1: something cannot be converted, so nothing is written, or a run beside the original differs."""
     new_file.check(output, printed=True)
     converted = convert(file, to, personality)
-    found, status = converted.found, StatusLine()
-    for each in found.refused:
-        write(sys.stderr, each.line_for(file))
-    if found.refused:
+    program, status = converted.found, StatusLine()
+    for problem in program.refused:
+        write(sys.stderr, problem.line_for(file))
+    if program.refused:
         write(sys.stderr, f"{file}: nothing is written")
         return WRONG
     runs = []
@@ -31,13 +31,13 @@ def run(file: str, to: str, personality: str | None, output: str, until: float) 
         runs.append(run_of_both)
         status.show(f"{counted(len(runs), 'world')} run")
     status.erase()
-    new_file.write(output, found.text, lambda line: write(sys.stdout, line))
+    new_file.write(output, program.text, lambda line: write(sys.stdout, line))
     differ = [both for both in runs if both[1]]
     stream = sys.stderr if output == new_file.STANDARD_OUTPUT else sys.stdout
-    lines = [f"{each.where(file)}: {each.what}; {each.hint}" for each in found.changes]
-    lines += [f"differs with {world}: {difference}" for world, difference in differ[:SHOWN]]
-    lines += [f"and in {counted(len(differ) - SHOWN, 'more world')}"] if differ[SHOWN:] else []
-    count = counted(len(found.changes), "change")
+    lines = [f"{change.where(file)}: {change.what}; {change.hint}" for change in program.changes]
+    lines += [f"differs with {world}: {difference}" for world, difference in differ[:MOST_SHOWN_WORLDS]]
+    lines += [f"and in {counted(len(differ) - MOST_SHOWN_WORLDS, 'more world')}"] if differ[MOST_SHOWN_WORLDS:] else []
+    count = counted(len(program.changes), "change")
     beside = f"run beside each other in {counted(len(runs), 'world')}, {len(differ)} differ"
     write(stream, *lines, f"{converted.source} to {converted.target}{new_file.place(output)}: {count}; {beside}")
     return DIFFERS if differ else 0

@@ -23,7 +23,7 @@ from multidrop.simulator.families import PROGRAMS
 if TYPE_CHECKING:
     from multidrop.simulator.program_run import Load
 
-AHEAD = 0.2
+LENGTH_TOLERANCE = 0.2
 """The part that one of two programs without an end may be ahead, and one beyond that."""
 
 
@@ -63,11 +63,11 @@ def convert(file: str, to: str, personality: str | None) -> Converted:
     except Diagnostic as problem:
         raise Diagnostic(problem.message, f"{file}: {problem.where}", problem.hint) from None
     refuse(examine_text(text, file, source, language).problems, file)
-    found = converter.convert(text, target)
-    if not found.refused:
-        wrong = errors(examine_text(found.text, file, target, language).problems)
-        found = found._replace(refused=[_placed(each, found.inserted) for each in wrong])
-    return Converted(file, text, language, source, target, found, converter)
+    program = converter.convert(text, target)
+    if not program.refused:
+        wrong = errors(examine_text(program.text, file, target, language).problems)
+        program = program._replace(refused=[_placed(each, program.inserted) for each in wrong])
+    return Converted(file, text, language, source, target, program, converter)
 
 
 def _placed(problem: Problem, inserted: int) -> Problem:
@@ -87,11 +87,11 @@ class _Done:
 
 def _done(load: Load, personality: str, world: Mapping[str, Any], until: float) -> _Done:
     from multidrop.simulator.cells import read_drive
-    from multidrop.simulator.program_events import Debugging, Summary
+    from multidrop.simulator.program_events import DebugWishes, Summary
 
     lists: dict[str, list[str]] = {"print": [], "outputs": [], "error": []}
     table = {"personality": personality, "world": world}
-    for event in load(read_drive(table, personality)).run("", until, Debugging(outputs=True)):
+    for event in load(read_drive(table, personality)).run("", until, DebugWishes(outputs=True)):
         fact = event.fact(0.0)
         for key, value in lists.items():
             value += [str(fact[key])] if key in fact else []
@@ -108,10 +108,12 @@ def _difference(one: _Done, other: _Done) -> str:
         yours = other.lists[what]
         both = min(len(mine), len(yours))
         at = next((n for n in range(both) if mine[n] != yours[n]), both)
-        if at < both or (len(mine) != len(yours) and not (cut and abs(len(mine) - len(yours)) <= 1 + AHEAD * both)):
+        if at < both or (
+            len(mine) != len(yours) and not (cut and abs(len(mine) - len(yours)) <= 1 + LENGTH_TOLERANCE * both)
+        ):
             count = f"{len(mine)}, converted: {len(yours)}"
             if what == "motions":
                 return f"motions: {count}"
-            shown = [repr(each[at]) if at < len(each) else "no more" for each in (mine, yours)]
+            shown = [repr(side[at]) if at < len(side) else "no more" for side in (mine, yours)]
             return f"{what} {at + 1}: {shown[0]}, converted: {shown[1]}"
     return "" if cut or one.position == other.position else f"position: {one.position}, converted: {other.position}"

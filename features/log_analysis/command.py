@@ -15,14 +15,14 @@ from multidrop.commands.log import STAMP, log_path, reported, text
 from multidrop.features.log_analysis import moments
 from multidrop.features.log_analysis.differences import Run, first_difference
 from multidrop.features.log_analysis.judge import RULES, judged
-from multidrop.features.log_analysis.moments import Known, Moments
+from multidrop.features.log_analysis.moments import KnownMoment, Moments
 from multidrop.features.log_analysis.replay import ReplayReport
 from multidrop.features.log_analysis.replay import replay as run
 from multidrop.shell.batch import runner
 from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.log import files, steps
-from multidrop.shell.log.files import Entry
+from multidrop.shell.log.files import LogEntry
 from multidrop.shell.streams.stdout import write
 
 if TYPE_CHECKING:
@@ -37,13 +37,13 @@ MOST_BACKS = 3
 def judge(file: str, as_json: bool) -> int:
     """Print each breach of a rule; the exit code says whether there is any. Raises Diagnostic for a wrong file."""
     path = Path(file)
-    found = judged(files.whole(path))
-    if found.sessions == found.unmarked:
-        why = "marks no commands and stops, as older versions did" if found.unmarked else "is not a session log"
+    judgement = judged(files.whole(path))
+    if judgement.sessions == judgement.unmarked:
+        why = "marks no commands and stops, as older versions did" if judgement.unmarked else "is not a session log"
         raise Diagnostic(why, str(path), "a log of this version is one JSON object a line")
 
     def work() -> None:
-        for rule, line, entry, said in found.breaches:
+        for rule, line, entry, said in judgement.breaches:
             if as_json:
                 fields = {"rule": rule, "time": entry.time.isoformat(), "where": line.where, "text": said}
                 write(sys.stdout, json.dumps(fields))
@@ -51,25 +51,27 @@ def judge(file: str, as_json: bool) -> int:
                 write(sys.stdout, f"{line.where}: {text(entry)[:STAMP]} {rule}: {said}")
 
     code = reported(work)
-    if found.unreadable:
-        write(sys.stderr, files.left_out(found.unreadable, "judged"))
-    counts = [counted(found.commands, "command"), counted(found.stops, "stop")]
-    counts += [counted(found.gaps, "gap")] * bool(found.gaps) + ["older sessions left out"] * bool(found.unmarked)
-    held = "no breach in the rest" if found.unreadable or found.gaps else f"all {len(RULES)} rules held"
-    broken = counted(len(found.breaches), "breach", "breaches") if found.breaches else held
+    if judgement.unreadable:
+        write(sys.stderr, files.left_out(judgement.unreadable, "judged"))
+    counts = [counted(judgement.commands, "command"), counted(judgement.stops, "stop")]
+    counts += [counted(judgement.gaps, "gap")] * bool(judgement.gaps) + ["older sessions left out"] * bool(
+        judgement.unmarked
+    )
+    held = "no breach in the rest" if judgement.unreadable or judgement.gaps else f"all {len(RULES)} rules held"
+    broken = counted(len(judgement.breaches), "breach", "breaches") if judgement.breaches else held
     write(sys.stderr, f"{path}: {broken} ({', '.join(counts)})")
-    return code or (BROKEN if found.breaches or found.unreadable else 0)
+    return code or (BROKEN if judgement.breaches or judgement.unreadable else 0)
 
 
 def at(time: str, file: str, as_json: bool) -> int:
     """Print what was known at a time: the last entry of each kind and place, and the last polls."""
-    found = moments.known(log_path(file), time)
+    moment = moments.known(log_path(file), time)
 
     def work() -> None:
-        if found.backs and not as_json:
-            write(sys.stdout, _set_back(found))
-        for each in found.known:
-            write(sys.stdout, *(_objects(each, found) if as_json else _lines(each)))
+        if moment.backs and not as_json:
+            write(sys.stdout, _set_back(moment))
+        for known in moment.known:
+            write(sys.stdout, *(_objects(known, moment) if as_json else _lines(known)))
 
     return reported(work)
 
@@ -85,7 +87,7 @@ def _set_back(found: Moments) -> str:
     return f"the clock was set back in this log, from {times}; it has this time {found.total} times: {shown} are shown"
 
 
-def _objects(found: Known, all_: Moments) -> Iterator[str]:
+def _objects(found: KnownMoment, all_: Moments) -> Iterator[str]:
     """A moment as JSON: its facts, the entries, and a sample for each axis."""
     session, stopped = found.session, found.stopped
     fact: dict[str, object] = {"at": found.at.isoformat(), "file": str(found.path)}
@@ -93,17 +95,17 @@ def _objects(found: Known, all_: Moments) -> Iterator[str]:
     fact |= {"since": None if session is None else session.time.isoformat()}
     fact |= {"stopped": None if stopped is None else stopped.time.isoformat()}
     if all_.backs:
-        backs = [[each.isoformat() for each in both] for both in all_.backs]
+        backs = [[moment.isoformat() for moment in both] for both in all_.backs]
         fact |= {"clock_set_back": backs, "moments": all_.total}
     yield json.dumps({"moment": fact})
     yield from (line.data.decode().rstrip("\n") for line in found.lines)
     for (bus, drive), motions in found.motions.items():
-        for each in motions:
-            sample = {"time": each.at.isoformat(), "bus": bus, "drive": drive, "axis": each.axis}
-            yield json.dumps({"sample": sample | {"position": each.position, "velocity": each.velocity}})
+        for motion in motions:
+            sample = {"time": motion.at.isoformat(), "bus": bus, "drive": drive, "axis": motion.axis}
+            yield json.dumps({"sample": sample | {"position": motion.position, "velocity": motion.velocity}})
 
 
-def _lines(found: Known) -> Iterator[str]:
+def _lines(found: KnownMoment) -> Iterator[str]:
     """A moment for a person."""
     begun = "" if found.session is None else f": {found.session.text} since {_stamp(found.session)}"
     yield f"{found.path} at {_time(found.at)}{begun}"
@@ -113,10 +115,10 @@ def _lines(found: Known) -> Iterator[str]:
         yield f"stopped since {_stamp(found.stopped)}"
     yield from (text(line.entry) for line in found.lines if line.entry is not None)
     for place, motions in found.motions.items():
-        for each in motions:
-            velocity = "" if each.velocity is None else f", velocity {each.velocity}"
-            axis = each.axis and f" {each.axis}"
-            yield f"{_time(each.at)} =  {visible(join_target(*place))}{axis} position {each.position}{velocity}"
+        for motion in motions:
+            velocity = "" if motion.velocity is None else f", velocity {motion.velocity}"
+            axis = motion.axis and f" {motion.axis}"
+            yield f"{_time(motion.at)} =  {visible(join_target(*place))}{axis} position {motion.position}{velocity}"
 
 
 def _time(moment: datetime) -> str:
@@ -126,8 +128,10 @@ def _time(moment: datetime) -> str:
 def bisect(file1: str, file2: str, as_json: bool) -> int:
     """Print the first difference between two runs; the exit code says whether there is any, or may be."""
     runs = [Run(Path(file)) for file in (file1, file2)]
-    found = first_difference(*runs)
-    lines = [None if index is None else run.line(index) for run, index in zip(runs, found or (None, None), strict=True)]
+    difference = first_difference(*runs)
+    lines = [
+        None if index is None else run.line(index) for run, index in zip(runs, difference or (None, None), strict=True)
+    ]
     damaged = [place for file in (file1, file2) for place in files.damaged(Path(file))]
     if damaged:
         write(sys.stderr, files.left_out(damaged, "compared"))
@@ -135,10 +139,10 @@ def bisect(file1: str, file2: str, as_json: bool) -> int:
     def work() -> None:
         if as_json:
             both = [None if line is None else {"where": line.where, **json.loads(line.data)} for line in lines]
-            fact = {"differ": found is not None, "lines": [len(run.steps) for run in runs], "first": both}
+            fact = {"differ": difference is not None, "lines": [len(run.steps) for run in runs], "first": both}
             fact |= {"unreadable": damaged} if damaged else {}
             write(sys.stdout, json.dumps(fact))
-        elif found is None:
+        elif difference is None:
             readable = " that can be read" if damaged else ""
             write(sys.stdout, f"no difference in {counted(len(runs[0].steps), 'line')}{readable}")
         else:
@@ -147,23 +151,23 @@ def bisect(file1: str, file2: str, as_json: bool) -> int:
                 entry = None if line is None else line.entry
                 write(sys.stdout, none if line is None or entry is None else f"{line.where}: {text(entry)}")
 
-    return reported(work) or (DIFFERENT if found or damaged else 0)
+    return reported(work) or (DIFFERENT if difference or damaged else 0)
 
 
-def _stamp(entry: Entry) -> str:
+def _stamp(entry: LogEntry) -> str:
     return text(entry)[:STAMP]
 
 
 def replay(file: str, to: str, against: str, fast: bool, as_json: bool, agreed: bool) -> int:
     """Take a log again on other drives; report a wrong file before anything is opened."""
-    found = steps.read(Path(file))
-    if not found.steps:
+    logged = steps.read(Path(file))
+    if not logged.steps:
         raise Diagnostic("no line of the log was sent to a drive", file, "/log before the lines keeps them")
-    if found.damaged:  # a stop may be missing
-        write(sys.stderr, files.left_out(found.damaged, "sent"))
+    if logged.damaged:  # a stop may be missing
+        write(sys.stderr, files.left_out(logged.damaged, "sent"))
 
     async def body(session: Session) -> None:
-        await run(session, found, fast=fast, positions=bool(against), report=ReplayReport(as_json))
+        await run(session, logged, fast=fast, positions=bool(against), report=ReplayReport(as_json))
 
     url = to or f"sim:{against.removeprefix('sim:')}"
     loop = VirtualLoop if against else None

@@ -9,8 +9,8 @@ from itertools import islice
 from pathlib import Path
 
 from multidrop.base.errors import Diagnostic
-from multidrop.features.log_analysis.log_parts import BLOCK, Block, blocks_back, newest, open_part, rotated, steady
-from multidrop.shell.log.files import Line, entry_of, parts
+from multidrop.features.log_analysis.log_parts import BLOCK, LogBlock, blocks_back, newest, open_part, rotated, steady
+from multidrop.shell.log.files import LogLine, entry_of, parts
 
 _PLACE = rb'(?:, "bus": "(?:[^"\\]|\\.)*")?(?:, "drive": "(?:[^"\\]|\\.)*")?'
 _STEP = re.compile(rb'"kind": "(?:typed|printed|unsolicited|failed|stop)"[^\n]*\}(?=\r?$)', re.MULTILINE)
@@ -40,7 +40,7 @@ class Run:
         if not readable:
             raise Diagnostic("is not a session log", str(path), "a log of this version is one JSON object a line")
 
-    def line(self, index: int) -> Line:
+    def line(self, index: int) -> LogLine:
         """The line of a step. Raises Diagnostic where that is no entry, or the log was rotated since it was read."""
         step = self.steps[index]
         before: dict[Path, int] = {}
@@ -51,12 +51,12 @@ class Run:
                 number = before[path]
                 with open_part(path) as file:
                     file.seek(offset)
-                    block = Block(path, offset, file.read(size), False)
+                    block = LogBlock(path, offset, file.read(size), False)
                 match = next(islice(_STEP.finditer(block.data), index, None), None)
                 if match is None or match[0] != step:
                     raise rotated(path)
                 begin, data = block.line(match.start())
-                line = Line(path, number + block.data.count(b"\n", 0, begin) + 1, data, entry_of(data))
+                line = LogLine(path, number + block.data.count(b"\n", 0, begin) + 1, data, entry_of(data))
                 if line.entry is None:
                     raise Diagnostic("is not an entry of a session log", line.where, "the log is damaged there")
                 return line

@@ -18,7 +18,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.features.log_analysis.moments import BACK
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
-from multidrop.shell.log.files import BEGIN, Entry, Line
+from multidrop.shell.log.files import BEGIN, LogEntry, LogLine
 
 RULES = {
     "twice": "A typed command is sent once; again only after a NAK and a question, three times at most.",
@@ -29,12 +29,12 @@ RULES = {
     "credited": "A printed line was received after its drive was asked, and from a drive of no other name.",
     "silence": "A command that a person typed, to which nothing was received, is reported.",
 }
-KEPT = 20
+MOST_KEPT_EXCHANGES = 20
 """The exchanges of a drive in which a printed line is looked for."""
 REPEATS = 3
 """How often a command that was rejected as damaged is sent again."""
 READINGS = 2
-AT_ONCE = timedelta(seconds=5)
+OTHER_TAB_DELAY = timedelta(seconds=5)
 """The time in which a line may be typed in another tab, while the one before waits for its reply."""
 MOMENT = timedelta(seconds=0.1)
 """The time after a stop in which the confirmation of an earlier one may still be said."""
@@ -51,8 +51,8 @@ class Breach(NamedTuple):
     """A broken rule, and the line that shows it."""
 
     rule: str
-    line: Line
-    entry: Entry
+    line: LogLine
+    entry: LogEntry
     text: str
 
 
@@ -111,7 +111,7 @@ class _Session:
         """Those before the last stop, which an earlier one may be confirmed by in this moment."""
         self._commanded: set[Place] = set()
 
-    def take(self, entry: Entry) -> Iterator[tuple[str, str]]:
+    def take(self, entry: LogEntry) -> Iterator[tuple[str, str]]:
         """Take an entry, where commands and stops are marked; yield each rule that it breaks, and how."""
         self._keep_time(entry.time)
         if entry.kind == "log":
@@ -130,7 +130,7 @@ class _Session:
             self._stops, self._stop, self._due = self._stops + 1, entry.time, set(self._buses)
             self._earlier = Counter(self._replies) if self._stops > 1 else Counter()
             for bus, drive in [*self._replies]:
-                if self._stops == 1 or self._commanded & {(bus, drive), *((bus, each) for each in EVERYONE)}:
+                if self._stops == 1 or self._commanded & {(bus, drive), *((bus, address) for address in EVERYONE)}:
                     del self._replies[bus, drive]
             self._commanded.clear()
             self._report("")
@@ -166,11 +166,11 @@ class _Session:
 
     def _report(self, bus: str) -> None:
         """Something was said of a bus; empty: of all."""
-        for (each, *_), typed in self._last.items():
-            typed.reported = typed.reported or bus in ("", each)
+        for (place, *_), typed in self._last.items():
+            typed.reported = typed.reported or bus in ("", place)
         self._silent = [(place, typed) for place, typed in self._silent if bus not in ("", place[0])]
 
-    def _line_typed(self, entry: Entry) -> Iterator[tuple[str, str]]:
+    def _line_typed(self, entry: LogEntry) -> Iterator[tuple[str, str]]:
         if not entry.bus:  # a verb may send the same texts by itself
             self._last.clear()
             self._typed.clear()
@@ -180,7 +180,7 @@ class _Session:
         origin = entry.bus, entry.drive, entry.by
         before = self._last.get(origin) if entry.by == By.OPERATOR.value else None  # several macros may play at once
         if before is not None and before.sent and not (before.heard or before.reported or entry.drive in EVERYONE):
-            if entry.time - before.at < AT_ONCE:
+            if entry.time - before.at < OTHER_TAB_DELAY:
                 self._silent.append(((entry.bus, entry.drive), before))
             else:
                 yield _silence(before)
@@ -189,7 +189,7 @@ class _Session:
         self._lines.add((entry.bus, entry.drive, text))
         self._unsent.discard((entry.bus, entry.drive, text))
 
-    def _sent(self, entry: Entry) -> Iterator[tuple[str, str]]:
+    def _sent(self, entry: LogEntry) -> Iterator[tuple[str, str]]:
         place, earlier = (entry.bus, entry.drive), self._stop is not None and entry.time < self._stop
         self._sent_on.add(entry.bus)
         if entry.bus in self._due and not earlier:
@@ -200,11 +200,11 @@ class _Session:
             self._asked[entry.bus] = "" if entry.stop else entry.drive
             return
         self._asked[entry.bus] = entry.drive
-        self._exchanges.setdefault(place, deque(maxlen=KEPT)).append([entry.text, ""])
+        self._exchanges.setdefault(place, deque(maxlen=MOST_KEPT_EXCHANGES)).append([entry.text, ""])
         last = [each for key, each in self._last.items() if key[:2] == place]
-        for each in last:
-            each.asked += not entry.command
-            each.at = entry.time
+        for last_typed in last:
+            last_typed.asked += not entry.command
+            last_typed.at = entry.time
         if not entry.command:
             return
         yield from self._over(place)
@@ -229,26 +229,26 @@ class _Session:
                 yield _silence(typed)
         self._silent = [(at, typed) for at, typed in self._silent if at != place]
 
-    def _printed(self, entry: Entry) -> Iterator[tuple[str, str]]:
+    def _printed(self, entry: LogEntry) -> Iterator[tuple[str, str]]:
         exchanges = self._exchanges.get((entry.bus, entry.drive))
         asked = any(key[:2] == (entry.bus, entry.drive) for key in self._last)
         if exchanges is None or not asked or entry.text in self._early.get(entry.bus, ""):
             return  # what it answers was typed, or sent, before the log began
-        found = [_named(sent, received, entry.text) for sent, received in exchanges]
-        names = {name for each in found if each is not None for name in each}
-        if all(each is None for each in found):
+        named = [_named(sent, received, entry.text) for sent, received in exchanges]
+        names = {name for names_of in named if names_of is not None for name in names_of}
+        if all(names_of is None for names_of in named):
             yield "credited", f"{entry.text!r} was printed and not received"
         elif names and entry.drive not in names:
             yield "credited", f"{entry.text!r} came from {', '.join(sorted(names))}"
 
-    def _said(self, entry: Entry) -> Iterator[tuple[str, str]]:
+    def _said(self, entry: LogEntry) -> Iterator[tuple[str, str]]:
         self._report(entry.bus)
-        for found in UNSENT.finditer(entry.text):
-            target = _target(found[1] or found[2], entry)
+        for match in UNSENT.finditer(entry.text):
+            target = _target(match[1] or match[2], entry)
             typed = self._typed.get(target)
             if entry.kind == "failed" and typed is not None and typed.sent:
                 yield "not sent", f"{typed.text!r} was sent"
-            if found[2] or target in self._lines:
+            if match[2] or target in self._lines:
                 self._unsent.add(target)
         if entry.kind == "notice" and self._stop is not None and STOPPED.match(entry.text):
             drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")
@@ -273,7 +273,7 @@ def _text(typed: str) -> str:
     return str(parsed.text) if isinstance(parsed, DriveLine) else typed
 
 
-def _target(typed: str, entry: Entry) -> tuple[str, str, str]:
+def _target(typed: str, entry: LogEntry) -> tuple[str, str, str]:
     """The bus, the drive and the text of a line that an entry names."""
     try:
         parsed = parse(typed)
@@ -316,20 +316,20 @@ class Judgement:
     breaches: list[Breach] = field(default_factory=list)
 
 
-def judged(lines: Iterable[Line]) -> Judgement:
+def judged(lines: Iterable[LogLine]) -> Judgement:
     """Judge the lines of a log."""
-    found, session = Judgement(), _Session()
+    judgement, session = Judgement(), _Session()
     for line in lines:
         entry = line.entry
         if entry is None or entry.kind == "missing" or (entry.kind == "log" and entry.text.startswith(BEGIN)):
             session = _Session(session.marked)
         if entry is None and line.data.strip():
-            found.unreadable.append(line.where)
+            judgement.unreadable.append(line.where)
         if entry is not None:
-            found.gaps += entry.kind == "missing"
-            found.commands += bool(entry.command)
-            found.stops += entry.kind == "stop"
-            found.sessions += entry.kind == "log"
-            found.unmarked += entry.kind == "log" and not entry.marks
-            found.breaches += (Breach(rule, line, entry, text) for rule, text in session.take(entry))
-    return found
+            judgement.gaps += entry.kind == "missing"
+            judgement.commands += bool(entry.command)
+            judgement.stops += entry.kind == "stop"
+            judgement.sessions += entry.kind == "log"
+            judgement.unmarked += entry.kind == "log" and not entry.marks
+            judgement.breaches += (Breach(rule, line, entry, text) for rule, text in session.take(entry))
+    return judgement

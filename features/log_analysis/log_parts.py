@@ -14,10 +14,10 @@ from typing import IO, NamedTuple, TypeVar
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import opened, why
-from multidrop.shell.log.files import BEGIN, INDEX, LONGEST, Entry, Line, entry_of, parts
+from multidrop.shell.log.files import BEGIN, INDEX, LONGEST_LOG_LINE, LogEntry, LogLine, entry_of, parts
 from multidrop.shell.log.index import LogIndex, index_of
 
-BLOCK = 4 * LONGEST
+BLOCK = 4 * LONGEST_LOG_LINE
 """The bytes that are searched at once; no entry is as long."""
 ATTEMPTS = 3
 """Attempts to read a log that is rotated meanwhile."""
@@ -27,7 +27,7 @@ _INDEX = f'"kind": "log", "text": "{INDEX}"'.encode()
 T = TypeVar("T")
 
 
-class Block(NamedTuple):
+class LogBlock(NamedTuple):
     """Whole lines of a part, from an offset on. `first`: a session begins with them."""
 
     path: Path
@@ -54,7 +54,7 @@ def open_part(path: Path) -> IO[bytes]:
     return file
 
 
-def blocks_back(paths: Sequence[Path]) -> Iterator[Block]:
+def blocks_back(paths: Sequence[Path]) -> Iterator[LogBlock]:
     """Yield the lines of the last session of a log in blocks, the newest first."""
     for path in reversed(paths):
         with open_part(path) as file:
@@ -64,7 +64,7 @@ def blocks_back(paths: Sequence[Path]) -> Iterator[Block]:
                     return
 
 
-def back(file: IO[bytes], path: Path, first: int, last: int) -> Iterator[Block]:
+def back(file: IO[bytes], path: Path, first: int, last: int) -> Iterator[LogBlock]:
     """Yield the lines of a part between two offsets in blocks, the newest first, from the last session on."""
     while last > first:
         begin = max(first, last - BLOCK)
@@ -74,7 +74,7 @@ def back(file: IO[bytes], path: Path, first: int, last: int) -> Iterator[Block]:
         session = data.rfind(_SESSION, cut)
         if session >= 0:
             cut = data.rfind(b"\n", 0, session) + 1
-        yield Block(path, begin + cut, data[cut:], session >= 0)
+        yield LogBlock(path, begin + cut, data[cut:], session >= 0)
         if session >= 0:
             return
         last = begin + cut if 0 < cut < len(data) else begin  # else it is in a line that is no entry
@@ -85,7 +85,7 @@ def forth(file: IO[bytes], first: int, last: int) -> Iterator[tuple[int, bytes]]
     while first < last:
         file.seek(first)
         data = file.read(min(BLOCK, last - first)) or b"\n"
-        data += file.readline(min(LONGEST, last - first - len(data))) if last > first + len(data) else b""
+        data += file.readline(min(LONGEST_LOG_LINE, last - first - len(data))) if last > first + len(data) else b""
         yield first, data
         first += len(data)
 
@@ -169,14 +169,14 @@ def rotated(path: Path) -> Diagnostic:
     return Diagnostic("was rotated while it was read", str(path), "try again")
 
 
-def line_at(block: Block, place: int) -> Line | None:
+def line_at(block: LogBlock, place: int) -> LogLine | None:
     """The entry that has a place of a block; its number is its offset."""
     begin, data = block.line(place)
     entry = entry_of(data)
-    return None if entry is None else Line(block.path, block.offset + begin, data, entry)
+    return None if entry is None else LogLine(block.path, block.offset + begin, data, entry)
 
 
-def newest(block: Block) -> Iterator[Entry]:
+def newest(block: LogBlock) -> Iterator[LogEntry]:
     """The entries of a block, the last first."""
     end = len(block.data)
     while end > 0:

@@ -22,7 +22,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.families import FAMILIES
 from multidrop.features.log_analysis.log_parts import (
-    Block,
+    LogBlock,
     Segment,
     back,
     blocks_back,
@@ -34,14 +34,14 @@ from multidrop.features.log_analysis.log_parts import (
     steady,
 )
 from multidrop.shell.log import files
-from multidrop.shell.log.decoding import Assumed, Decoding, Measured
-from multidrop.shell.log.files import BEGIN, LONGEST, Entry, Line, entry_of, parts
+from multidrop.shell.log.decoding import Assumed, Decoding, MeasuredPosition
+from multidrop.shell.log.files import BEGIN, LONGEST_LOG_LINE, LogEntry, LogLine, entry_of, parts
 from multidrop.shell.log.index import KEPT, ZONE_AT, EntryKey, LogIndex
-from multidrop.shell.log.steps import Exchange
+from multidrop.shell.log.steps import LoggedPoll
 
 BACK = timedelta(seconds=1)
 """A time that is so much before that of the entry above it: the clock was set back. Threads differ by less."""
-MOST = 5
+MOST_KNOWN_TIMES = 5
 """The moments of one time that are found: the last ones."""
 POLLS, QUESTIONS, DECODED = 2000, 4, 16
 """The entries of polls before a moment in which samples are looked for; the questions of a drive that are shown; and
@@ -65,33 +65,33 @@ _KEPT = f"(?:{'|'.join(KEPT)})".encode()
 
 
 @dataclass
-class Known:
+class KnownMoment:
     """What was known at a moment of a session: lines of its log."""
 
     at: datetime
     path: Path
-    session: Entry | None
+    session: LogEntry | None
     """Its first entry; None where the log has none."""
-    last: Entry | None
+    last: LogEntry | None
     """The newest entry of the log, where that is before the moment."""
-    stopped: Entry | None
+    stopped: LogEntry | None
     """The stop that held."""
-    lines: list[Line]
+    lines: list[LogLine]
     """The last entry of each kind and place, and the last polls; by place, then in the order of the log."""
-    motions: dict[tuple[str, str], list[Measured]]
+    motions: dict[tuple[str, str], list[MeasuredPosition]]
     """The last position and velocity of each axis, by bus and drive, where its polls have them."""
 
 
 class Moments(NamedTuple):
     """The moments of one time, the earliest first, and when the clock of the log was set back."""
 
-    known: list[Known]
+    known: list[KnownMoment]
     total: int
-    """How often it was that time; only the last MOST are known."""
+    """How often it was that time; only the last MOST_KNOWN_TIMES are known."""
     backs: list[tuple[datetime, datetime]]
 
 
-class End(NamedTuple):
+class LogEnd(NamedTuple):
     """The end of what was logged until a moment: a part, an offset in it, and the zone of the entry before."""
 
     part: int
@@ -106,22 +106,22 @@ def known(path: Path, text: str) -> Moments:
 
 def _moments(path: Path, text: str) -> Moments:
     paths = parts(path)
-    last = next((each for block in blocks_back(paths) for each in newest(block)), None)
+    last = next((entry for block in blocks_back(paths) for entry in newest(block)), None)
     if last is None:
         raise Diagnostic("is not a session log", str(path), "a log of this version is one JSON object a line")
-    first = next((each.entry for each in files.lines(paths[0]) if each.entry is not None), last)
+    first = next((line.entry for line in files.lines(paths[0]) if line.entry is not None), last)
     at = moment(text, first.time, last.time)
     ends, backs = _ends(paths, at)
-    found: list[Known] = []
-    for end in ends[-MOST:]:
+    known: list[KnownMoment] = []
+    for end in ends[-MOST_KNOWN_TIMES:]:
         zoned = at if at.tzinfo else at.replace(tzinfo=_zone(end.zone))
-        found += _known(paths, end, zoned, last if end.offset is None else None)
-    if not found:
+        known += _known(paths, end, zoned, last if end.offset is None else None)
+    if not known:
         raise Diagnostic(f"nothing was logged until {at.isoformat(' ', 'milliseconds')}", str(path))
-    return Moments(found, len(ends), backs)
+    return Moments(known, len(ends), backs)
 
 
-def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[End], list[tuple[datetime, datetime]]]:
+def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[LogEnd], list[tuple[datetime, datetime]]]:
     """The ends of what was logged until a time, one for each time that the clock passed it; when it was set back."""
 
     @cache
@@ -132,7 +132,7 @@ def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[End], list[tuple[da
     def is_late(stamp: bytes) -> bool:
         return stamp[:ZONE_AT] > limit(stamp[ZONE_AT:])
 
-    ends: list[End] = []
+    ends: list[LogEnd] = []
     backs: list[tuple[datetime, datetime]] = []
     before, late, passed = b"", True, False
 
@@ -141,7 +141,7 @@ def _ends(paths: Sequence[Path], at: datetime) -> tuple[list[End], list[tuple[da
         if passed:  # times of threads that differ by less than BACK are in any order
             ends.pop()
         passed = True
-        ends.append(End(part, offset, before[ZONE_AT:]))
+        ends.append(LogEnd(part, offset, before[ZONE_AT:]))
 
     for part, path in enumerate(paths):
         for piece in _pieces(path):
@@ -195,7 +195,7 @@ def _read(file: IO[bytes], segment: Segment) -> bytes:
 def _set_back(before: bytes, after: bytes, at: datetime) -> tuple[datetime, datetime] | None:
     """Two times between which the clock was set back; as it was shown, where `at` has no zone."""
     try:
-        first, second = (datetime.fromisoformat(each.decode()) for each in (before, after))
+        first, second = (datetime.fromisoformat(stamp.decode()) for stamp in (before, after))
     except ValueError:  # a day that there is not
         return None
     zoned = first - second if at.tzinfo else first.replace(tzinfo=None) - second.replace(tzinfo=None)
@@ -207,7 +207,7 @@ def _zone(text: bytes) -> tzinfo | None:
     return datetime.fromisoformat(f"2000-01-01T00:00:00{text.decode()}").tzinfo
 
 
-def _known(paths: Sequence[Path], end: End, at: datetime, last: Entry | None) -> Iterator[Known]:
+def _known(paths: Sequence[Path], end: LogEnd, at: datetime, last: LogEntry | None) -> Iterator[KnownMoment]:
     """Yield what was known at the end of some entries, if these have anything. `last`: see Known."""
     search = Search(paths)
     search.run(end)
@@ -223,17 +223,17 @@ class Search:
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        self.found: dict[bytes, Line] = {}
+        self.found: dict[bytes, LogLine] = {}
         """The last entry of each kind and place, by its bytes up to the text."""
-        self.polls: list[Line] = []
+        self.polls: list[LogLine] = []
         """The last polls, the newest first."""
-        self.session: Entry | None = None
+        self.session: LogEntry | None = None
         """The first entry of the session."""
         self._paths = paths
         self._indexed = False
         """Whether an index line has named the entries."""
 
-    def run(self, end: End) -> None:
+    def run(self, end: LogEnd) -> None:
         """Raises Diagnostic for a part that cannot be read."""
         for number in range(end.part, -1, -1):
             with open_part(self._paths[number]) as file:
@@ -256,7 +256,7 @@ class Search:
                 return False
         return True
 
-    def _search(self, block: Block) -> None:
+    def _search(self, block: LogBlock) -> None:
         keys = set() if self._indexed else {*_other_keys(self.found).findall(block.data), _RESUME}
         for key in keys - self.found.keys():
             if (place := block.data.rfind(key)) >= 0 and (line := line_at(block, place)) is not None:
@@ -281,7 +281,7 @@ class Search:
         self.found |= {key: line for key, line in taken.items() if line is not None}
         return True
 
-    def _line(self, number: int, base: int, place: int) -> Line | None:
+    def _line(self, number: int, base: int, place: int) -> LogLine | None:
         """The line at a place of the log, from a part and the place where it begins; None: its part was removed."""
         while place < base:
             number -= 1
@@ -291,8 +291,8 @@ class Search:
         path = self._paths[number]
         with open_part(path) as file:
             file.seek(place - base)
-            data = file.readline(LONGEST)
-        return Line(path, place - base, data, entry_of(data))
+            data = file.readline(LONGEST_LOG_LINE)
+        return LogLine(path, place - base, data, entry_of(data))
 
 
 def _until(found: Sequence[Segment], offset: int | None) -> list[Segment]:
@@ -319,13 +319,13 @@ def _other_keys(found: Collection[bytes]) -> re.Pattern[bytes]:
 def _made(
     at: datetime,
     path: Path,
-    session: Entry | None,
-    last: Entry | None,
-    found: dict[bytes, Line],
-    polls: list[Line],
+    session: LogEntry | None,
+    last: LogEntry | None,
+    found: dict[bytes, LogLine],
+    polls: list[LogLine],
     paths: Sequence[Path],
-) -> Known:
-    def place(line: Line) -> tuple[int, int]:
+) -> KnownMoment:
+    def place(line: LogLine) -> tuple[int, int]:
         return paths.index(line.path), line.number
 
     resumed = found.pop(_RESUME, None)
@@ -334,17 +334,17 @@ def _made(
     stop = next((line for line in lines if entries[line.data].kind == "stop"), None)
     if stop is not None and resumed is not None and place(resumed) > place(stop):
         stop = None
-    closed = {each.bus for each in entries.values() if each.kind == "bus" and each.text == "closed"}
+    closed = {entry.bus for entry in entries.values() if entry.kind == "bus" and entry.text == "closed"}
     shown = [line for line in lines if entries[line.data].bus not in closed or entries[line.data].kind == "bus"]
     shown.sort(key=lambda line: ((each := entries[line.data]).bus, each.drive, each.kind != "bus", place(line)))
     moved = {drive: _motion(drive[1], polled) for drive, polled in _exchanges(polls).items()}
     stopped = None if stop is None else stop.entry
-    return Known(at, path, session, last, stopped, shown, {drive: each for drive, each in moved.items() if each})
+    return KnownMoment(at, path, session, last, stopped, shown, {drive: each for drive, each in moved.items() if each})
 
 
-def _exchanges(polls: Sequence[Line]) -> dict[tuple[str, str], list[Exchange]]:
+def _exchanges(polls: Sequence[LogLine]) -> dict[tuple[str, str], list[LoggedPoll]]:
     """The last polls of each drive with their replies, in their order. `polls` has the newest first."""
-    found: dict[tuple[str, str], list[Exchange]] = defaultdict(list)
+    by_drive: dict[tuple[str, str], list[LoggedPoll]] = defaultdict(list)
     replies: dict[str, bytes] = defaultdict(bytes)
     for line in polls:
         if (entry := line.entry) is None:
@@ -352,14 +352,14 @@ def _exchanges(polls: Sequence[Line]) -> dict[tuple[str, str], list[Exchange]]:
         data, place = entry.text.encode("latin-1"), (entry.bus, entry.drive)
         if entry.kind == "received":
             replies[entry.bus] = data + replies[entry.bus]
-        elif len(found[place]) < DECODED:
-            found[place].append(Exchange("", entry.time, *place, data, replies.pop(entry.bus, b"")))
+        elif len(by_drive[place]) < DECODED:
+            by_drive[place].append(LoggedPoll("", entry.time, *place, data, replies.pop(entry.bus, b"")))
         else:
             replies.pop(entry.bus, None)
-    return {place: each[::-1] for place, each in found.items()}
+    return {place: each[::-1] for place, each in by_drive.items()}
 
 
-def _motion(address: str, polled: Sequence[Exchange]) -> list[Measured]:
+def _motion(address: str, polled: Sequence[LoggedPoll]) -> list[MeasuredPosition]:
     """The last motion of each axis, by the first family and settings whose polls these are."""
     for family in FAMILIES.values():
         unknown = family.new_state(family.codec, address)
@@ -371,14 +371,14 @@ def _motion(address: str, polled: Sequence[Exchange]) -> list[Measured]:
             for name, value in zip(more, values[len(names) :], strict=True):
                 setattr(state, name, value)
             decoding = Decoding(Assumed(state))
-            if found := {each.axis: each for exchange in polled for each in decoding.take(exchange)}:
-                return [*found.values()]
+            if positions := {position.axis: position for exchange in polled for position in decoding.take(exchange)}:
+                return [*positions.values()]
     return []
 
 
-def _samples(polls: Sequence[Line]) -> Iterator[Line]:
+def _samples(polls: Sequence[LogLine]) -> Iterator[LogLine]:
     """The newest questions of each drive that were polled, each with its reply. `polls` has the newest first."""
-    replies: dict[str, list[Line]] = defaultdict(list)
+    replies: dict[str, list[LogLine]] = defaultdict(list)
     asked: dict[tuple[str, str], list[str]] = defaultdict(list)
     for line in polls:
         if (entry := line.entry) is None:
@@ -399,15 +399,15 @@ def moment(text: str, first: datetime, last: datetime) -> datetime:
     """
     wrong = Diagnostic(f"{text!r} is not a time", "log at", "as in 11:37:05.2, or '2026-11-22 11:37:05'")
     try:
-        found, of_any_day = datetime.fromisoformat(text), False
+        when, of_any_day = datetime.fromisoformat(text), False
     except ValueError:
         try:
-            found, of_any_day = datetime.combine(last.date(), time.fromisoformat(text)), True
+            when, of_any_day = datetime.combine(last.date(), time.fromisoformat(text)), True
         except ValueError:
             raise wrong from None
-    if not datetime.min.year < found.year < datetime.max.year:  # another zone may have no such time
+    if not datetime.min.year < when.year < datetime.max.year:  # another zone may have no such time
         raise wrong
-    if not found.tzinfo:
+    if not when.tzinfo:
         first, last = first.replace(tzinfo=None), last.replace(tzinfo=None)
-    day_before = found - timedelta(days=1)
-    return day_before if of_any_day and found > last and day_before >= first else found
+    day_before = when - timedelta(days=1)
+    return day_before if of_any_day and when > last and day_before >= first else when

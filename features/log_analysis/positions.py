@@ -11,15 +11,15 @@ from multidrop.dialects.family import Motion
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
 from multidrop.shell.comparing.compared import Compared
-from multidrop.shell.comparing.differences import LIMIT, Verdict
+from multidrop.shell.comparing.differences import DIFFERENCE_LIMIT, Verdict
 from multidrop.shell.events import Diverged
 from multidrop.shell.line_syntax import EVERYONE, join_target
-from multidrop.shell.log.decoding import Decoding, Measured, printed
-from multidrop.shell.log.steps import Exchange, Step
+from multidrop.shell.log.decoding import Decoding, MeasuredPosition, printed
+from multidrop.shell.log.steps import LoggedPoll, LoggedStep
 from multidrop.shell.log.targets import Place
 from multidrop.simulator.family import Shadow
 
-LATE = 0.05
+LONGEST_SEND_DELAY = 0.05
 """Seconds by which a line may have left later than the log says that it was typed."""
 Reading = tuple[Shadow, float]
 """A simulated drive, and its time."""
@@ -49,7 +49,7 @@ class _Simulated:
 
     def motion(self, at: float) -> dict[str, Motion]:
         shadow, now = self._read()
-        return {each.axis: each for each in shadow.motion(now)}
+        return {of_axis.axis: of_axis for of_axis in shadow.motion(now)}
 
     def align(self, axis: str, position: int, at: float) -> None:
         shadow, now = self._read()
@@ -74,7 +74,7 @@ class _Place:
         self._moved = self._moved or (bool(line) and self.drive.starts(line))
         self.compared.disturbed(at)
 
-    def take(self, found: Measured, at: float) -> Iterator[Diverged]:
+    def take(self, found: MeasuredPosition, at: float) -> Iterator[Diverged]:
         """Compare a position; the simulated drive begins at one that was measured before the first motion."""
         expected = self.compared.twin.motion(at).get(found.axis)
         if expected is None:
@@ -83,14 +83,16 @@ class _Place:
         if found.axis not in self.counts and not (self._moved or velocity or expected.velocity):
             self.compared.twin.align(found.axis, found.position, at)
         self.counts[found.axis] = self.counts.get(found.axis, 0) + 1
-        self.compared.comparison(found.axis).lag = LATE
+        self.compared.comparison(found.axis).lag = LONGEST_SEND_DELAY
         sample = Sample(at, self.address, found.position, velocity, found.axis)
-        yield from (each for each in self.compared.sample(sample, LIMIT) if isinstance(each, Diverged))
+        yield from (
+            finding for finding in self.compared.sample(sample, DIFFERENCE_LIMIT) if isinstance(finding, Diverged)
+        )
 
     def end(self) -> Iterator[Diverged]:
         for axis, comparison in self.compared.axes.items():
             if comparison.settle() is Verdict.DIVERGED:
-                news = self.compared.news(Verdict.DIVERGED, comparison, self.address, axis, LIMIT)
+                news = self.compared.news(Verdict.DIVERGED, comparison, self.address, axis, DIFFERENCE_LIMIT)
                 assert isinstance(news, Diverged)
                 yield news
 
@@ -98,14 +100,14 @@ class _Place:
         return f"{self.name}.{axis}" if axis else self.name
 
 
-class Positions:
+class LoggedPositions:
     """The measured positions of a log, each compared when its time has come."""
 
     def __init__(
         self,
         targets: Mapping[Place, Drive],
-        polls: Sequence[Exchange],
-        steps: Sequence[Step],
+        polls: Sequence[LoggedPoll],
+        steps: Sequence[LoggedStep],
         read: Callable[[Drive], Reading],
         found: Callable[[Divergence], None],
     ) -> None:
@@ -119,35 +121,35 @@ class Positions:
         self._first = steps[0].at
         self.diverged: dict[str, Divergence] = {}
         """The first divergence of each axis, by its name."""
-        everything: list[Exchange | Step] = [*polls, *steps]
+        everything: list[LoggedPoll | LoggedStep] = [*polls, *steps]
         self._all = sorted(everything, key=lambda each: each.at)
 
     async def run(self, began: float) -> None:
         """Compare each position at its time. `began`: the time of the first step."""
         loop = asyncio.get_running_loop()
-        for each in self._all:
-            at = (each.at - self._first).total_seconds()
+        for step in self._all:
+            at = (step.at - self._first).total_seconds()
             if began + at > loop.time():
                 await asyncio.sleep(began + at - loop.time())
-            if isinstance(each, Step) and (not each.text or each.drive in EVERYONE):  # a stop, or a line for all
+            if isinstance(step, LoggedStep) and (not step.text or step.drive in EVERYONE):  # a stop, or a line for all
                 for (bus, _), place in self._places.items():
-                    if each.bus in ("", bus):
-                        place.disturbed(at, each.text)
-            elif (own := self._places.get((each.bus, each.drive))) is not None:
-                measured = list(own.decoding.take(each) if isinstance(each, Exchange) else printed(each, own.drive))
-                if isinstance(each, Step) and not measured:
-                    own.disturbed(at, each.text)
-                for found in measured:
-                    self._report(own, own.take(found, at))
+                    if step.bus in ("", bus):
+                        place.disturbed(at, step.text)
+            elif (own := self._places.get((step.bus, step.drive))) is not None:
+                measured = list(own.decoding.take(step) if isinstance(step, LoggedPoll) else printed(step, own.drive))
+                if isinstance(step, LoggedStep) and not measured:
+                    own.disturbed(at, step.text)
+                for position in measured:
+                    self._report(own, own.take(position, at))
         for place in self._places.values():
             self._report(place, place.end())
 
     def _report(self, place: _Place, news: Iterator[Diverged]) -> None:
-        for each in news:
-            name = place.shown(each.axis)
+        for event in news:
+            name = place.shown(event.axis)
             if name not in self.diverged:
-                at = self._first + timedelta(seconds=each.at)
-                self.diverged[name] = Divergence(name, at, each.difference, each.limit, each.causes)
+                at = self._first + timedelta(seconds=event.at)
+                self.diverged[name] = Divergence(name, at, event.difference, event.limit, event.causes)
                 self._found(self.diverged[name])
 
     @property

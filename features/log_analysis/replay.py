@@ -23,7 +23,7 @@ from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE, join_target
-from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from multidrop.shell.log.steps import WORLD, LoggedStep, LoggedSteps, compared, errors_differ
 from multidrop.shell.log.targets import targets
 from multidrop.shell.openings import model
 from multidrop.shell.streams.stdout import write
@@ -31,7 +31,7 @@ from multidrop.shell.workspace import LATCHED
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.features.log_analysis.positions import Divergence, Positions, Reading
+    from multidrop.features.log_analysis.positions import Divergence, LoggedPositions, Reading
     from multidrop.shell.channel import Channel
     from multidrop.shell.session import Session
 
@@ -42,7 +42,7 @@ class ReplayReport:
     def __init__(self, as_json: bool = False) -> None:
         self._json = as_json
 
-    def differs(self, step: Step, text: str, difference: str) -> None:
+    def differs(self, step: LoggedStep, text: str, difference: str) -> None:
         fact: dict[str, object] = {
             "where": step.where,
             "bus": step.bus,
@@ -63,7 +63,7 @@ class ReplayReport:
         self._put(found.text, {"diverged": fact})
 
     def summary(
-        self, channel: Channel, lines: int, differences: int, uncompared: int, positions: Positions | None
+        self, channel: Channel, lines: int, differences: int, uncompared: int, positions: LoggedPositions | None
     ) -> None:
         moved = f"; {uncompared} in motion printed another number" if uncompared else ""
         channel.notify(
@@ -82,7 +82,7 @@ class ReplayReport:
             write(sys.stdout, json.dumps({"summary": fact}))
 
     @staticmethod
-    def words(lines: int, differences: int, positions: Positions | None) -> str:
+    def words(lines: int, differences: int, positions: LoggedPositions | None) -> str:
         """The differences in words; empty: none."""
         said = [f"{differences} of {counted(lines, 'line')} gave another answer than in the log"] if differences else []
         if positions is not None and positions.diverged:
@@ -95,7 +95,7 @@ class ReplayReport:
 
 
 async def replay(
-    session: Session, found: Steps, *, fast: bool, positions: bool = False, report: ReplayReport | None = None
+    session: Session, found: LoggedSteps, *, fast: bool, positions: bool = False, report: ReplayReport | None = None
 ) -> None:
     """Take the steps on the open buses; `fast`: without the pauses of the log.
 
@@ -117,7 +117,7 @@ async def replay(
 class Replay:
     """The steps of a log with the drives that they are for."""
 
-    def __init__(self, session: Session, found: Steps, report: ReplayReport) -> None:
+    def __init__(self, session: Session, found: LoggedSteps, report: ReplayReport) -> None:
         """Find the drives. Raises Diagnostic where a bus or a drive of the log has no counterpart."""
         self._session, self._found, self._report = session, found, report
         self._simulated = all(name in session.cells for name in session.buses)
@@ -139,8 +139,8 @@ class Replay:
             )
         if not self._simulated:
             session, moving = self._session, 0
-            for each in dict.fromkeys(self._targets.values()):
-                session.notify(f"drive {_name(each)}: {model(each)} on {each.link.transport.name}", outcome=True)
+            for target in dict.fromkeys(self._targets.values()):
+                session.notify(f"drive {_name(target)}: {model(target)} on {target.link.transport.name}", outcome=True)
             for step in self.steps:
                 if (drive := self._targets.get((step.bus, step.drive))) is None:
                     continue
@@ -174,12 +174,12 @@ class Replay:
             self._report.summary(self._session, done, differences, self._uncompared, measured)
         return self._report.words(len(self.steps), differences, measured)
 
-    def _positions(self) -> Positions:
-        from multidrop.features.log_analysis.positions import Positions
+    def _positions(self) -> LoggedPositions:
+        from multidrop.features.log_analysis.positions import LoggedPositions
 
         targets = {place: drive for place, drive in self._targets.items() if drive.address not in EVERYONE}
-        polls = [each for each in self._found.polls if (each.bus, each.drive) in targets]
-        return Positions(targets, polls, self.steps, self._read, self._report.diverged)
+        polls = [poll for poll in self._found.polls if (poll.bus, poll.drive) in targets]
+        return LoggedPositions(targets, polls, self.steps, self._read, self._report.diverged)
 
     def _read(self, drive: Drive) -> Reading:
         """The simulated drive in the part of one, and its time. Raises Diagnostic."""
@@ -190,7 +190,7 @@ class Replay:
             raise Diagnostic("the simulator does not tell where it is", _name(drive))
         return shadow, cell.now()
 
-    async def _step(self, step: Step) -> bool:
+    async def _step(self, step: LoggedStep) -> bool:
         """Take a step; whether its answer differs, which is shown."""
         if not step.text:  # every drive was stopped then, and the session went on
             if self._session.latched:
@@ -232,7 +232,7 @@ class Replay:
 
 
 @contextlib.asynccontextmanager
-async def _beside(positions: Positions | None, began: float) -> AsyncIterator[None]:
+async def _beside(positions: LoggedPositions | None, began: float) -> AsyncIterator[None]:
     """Compare positions meanwhile, to the end of the log; an early end ends that, too."""
     if positions is None:
         yield

@@ -14,7 +14,7 @@ from lsprotocol import types
 from multidrop.dialects.editing import Block, Offer, Span
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Problem
-from multidrop.shell.programs.program_text import Coloured, Edit, Fold, ProgramGrammar, ProgramText
+from multidrop.shell.programs.program_text import Coloured, Fold, ProgramGrammar, ProgramText, TextEdit
 from multidrop.shell.threads import in_thread
 
 T = TypeVar("T")
@@ -124,7 +124,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 """The end of a line for every client."""
 
 
-class Positions:
+class ColumnConverter:
     """Converts columns of lines between characters and code units; UTF-16 unless both agreed on another encoding."""
 
     def __init__(self, encoding: str | None) -> None:
@@ -152,7 +152,7 @@ class Positions:
         """Return the text after a change of all of it or of a range; an end before its start is there, too."""
         if isinstance(change, types.TextDocumentContentChangeWholeDocument):
             return change.text
-        ends = [0, *(found.end() for found in _LINE_END.finditer(text))]
+        ends = [0, *(match.end() for match in _LINE_END.finditer(text))]
 
         def offset(place: types.Position) -> int:
             if place.line >= len(ends):
@@ -202,7 +202,7 @@ _WORD = re.compile(r"\w+|.", re.DOTALL)
 _FENCES = re.compile(r"`+")
 
 
-def diagnostic(document: Document, positions: Positions, problem: Problem) -> types.Diagnostic:
+def diagnostic(document: Document, positions: ColumnConverter, problem: Problem) -> types.Diagnostic:
     """Return a problem at the word where it begins."""
     lines = document.text.lines
     line = min(problem.line - 1, len(lines) - 1)
@@ -239,10 +239,10 @@ def item(offer: Offer, number: int, place: types.Range, about: types.MarkupConte
     )
 
 
-def symbols(document: Document, positions: Positions, blocks: Iterable[Block]) -> list[types.DocumentSymbol]:
+def symbols(document: Document, positions: ColumnConverter, blocks: Iterable[Block]) -> list[types.DocumentSymbol]:
     """Return an outline, without IF and WHILE."""
     lines = document.text.lines
-    found = []
+    outline = []
     for block in blocks:
         if block.kind not in _SYMBOLS:
             continue
@@ -250,7 +250,7 @@ def symbols(document: Document, positions: Positions, blocks: Iterable[Block]) -
         place = positions.range(lines, block.place)
         begin = types.Position(block.place.line, 0)
         end = types.Position(last, positions.units(lines[last], len(lines[last])))
-        found.append(
+        outline.append(
             types.DocumentSymbol(
                 name=block.name,
                 detail=block.detail or None,
@@ -260,7 +260,7 @@ def symbols(document: Document, positions: Positions, blocks: Iterable[Block]) -
                 children=symbols(document, positions, block.parts) or None,
             )
         )
-    return found
+    return outline
 
 
 def folding(fold: Fold) -> types.FoldingRange:
@@ -268,7 +268,7 @@ def folding(fold: Fold) -> types.FoldingRange:
     return types.FoldingRange(fold.first, fold.last, kind=kind)
 
 
-def tokens(document: Document, positions: Positions, parts: Iterable[Coloured]) -> types.SemanticTokens:
+def tokens(document: Document, positions: ColumnConverter, parts: Iterable[Coloured]) -> types.SemanticTokens:
     """Return the coloured parts, each by its distance from the one before."""
     data: list[int] = []
     line = start = 0
@@ -285,8 +285,8 @@ def tokens(document: Document, positions: Positions, parts: Iterable[Coloured]) 
     return types.SemanticTokens(data=data)
 
 
-def text_edits(document: Document, positions: Positions, edits: Iterable[Edit]) -> list[types.TextEdit]:
-    return [types.TextEdit(positions.range(document.text.lines, each.place), each.text) for each in edits]
+def text_edits(document: Document, positions: ColumnConverter, edits: Iterable[TextEdit]) -> list[types.TextEdit]:
+    return [types.TextEdit(positions.range(document.text.lines, edit.place), edit.text) for edit in edits]
 
 
 def workspace_edit(document: Document, edits: list[types.TextEdit], versioned: bool) -> types.WorkspaceEdit:

@@ -20,7 +20,7 @@ import multidrop
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.program_files import Problem
 from multidrop.features.lsp import replies
-from multidrop.features.lsp.replies import DELAY, Document, Documents, Positions
+from multidrop.features.lsp.replies import DELAY, ColumnConverter, Document, Documents
 from multidrop.shell.streams.stdout import shortened
 from multidrop.simulator.declared import simulated
 
@@ -102,8 +102,8 @@ class Server:
             self.protocol_server.feature(name, options)(partial(handler))  # it sets attributes
 
     @property
-    def _positions(self) -> Positions:
-        return Positions(self.protocol_server.workspace.position_encoding)
+    def _positions(self) -> ColumnConverter:
+        return ColumnConverter(self.protocol_server.workspace.position_encoding)
 
     @property
     def _client(self) -> types.ClientCapabilities:
@@ -111,12 +111,12 @@ class Server:
 
     def _publish(self, document: Document | str, problems: Sequence[Problem]) -> None:
         if isinstance(document, str):
-            found = types.PublishDiagnosticsParams(uri=document, diagnostics=[])
+            published = types.PublishDiagnosticsParams(uri=document, diagnostics=[])
         else:
             positions = self._positions
-            listed = [replies.diagnostic(document, positions, each) for each in problems]
-            found = types.PublishDiagnosticsParams(document.uri, listed, document.version)
-        self.protocol_server.text_document_publish_diagnostics(found)
+            listed = [replies.diagnostic(document, positions, problem) for problem in problems]
+            published = types.PublishDiagnosticsParams(document.uri, listed, document.version)
+        self.protocol_server.text_document_publish_diagnostics(published)
 
     def _show(self, message: str) -> None:
         warning = types.ShowMessageParams(types.MessageType.Warning, f"multidrop: {message}")
@@ -137,7 +137,7 @@ class Server:
         product = options.get("personality") if isinstance(options, dict) else None
         if product is None:
             return
-        known = [each for row in simulated().values() if row.programs for each in row.personalities]
+        known = [personality for row in simulated().values() if row.programs for personality in row.personalities]
         if isinstance(product, str) and product.upper() in known:
             self.documents.check_for(product.upper())
         else:
@@ -159,11 +159,11 @@ class Server:
     # At a place
 
     def hover(self, params: types.HoverParams) -> types.Hover | None:
-        if (at := self._place(params)) is None or (found := at[0].text.help_at(*at[1:])) is None:
+        if (at := self._place(params)) is None or (help_there := at[0].text.help_at(*at[1:])) is None:
             return None
         wanted = self._client.text_document.hover if self._client.text_document else None
-        shown = replies.markup(found.lines, _shows_markdown(wanted.content_format if wanted else None))
-        return types.Hover(shown, self._positions.range(at[0].text.lines, found.place))
+        shown = replies.markup(help_there.lines, _shows_markdown(wanted.content_format if wanted else None))
+        return types.Hover(shown, self._positions.range(at[0].text.lines, help_there.place))
 
     def completion(self, params: types.CompletionParams) -> types.CompletionList:
         items: list[types.CompletionItem] = []
@@ -181,11 +181,11 @@ class Server:
         return types.CompletionList(is_incomplete=False, items=items)
 
     def _named(self, params: At, declared: bool, used: bool) -> Found:
-        if (at := self._place(params)) is None or (found := at[0].text.name_at(*at[1:])) is None:
+        if (at := self._place(params)) is None or (named := at[0].text.name_at(*at[1:])) is None:
             return []
-        name, lines = found[0], at[0].text.lines
-        places = [each for each in name.places if (declared if each in name.declared else used)]
-        return [types.Location(at[0].uri, self._positions.range(lines, each)) for each in places]
+        name, lines = named[0], at[0].text.lines
+        places = [place for place in name.places if (declared if place in name.declared else used)]
+        return [types.Location(at[0].uri, self._positions.range(lines, place)) for place in places]
 
     def definition(self, params: types.DefinitionParams) -> Found:
         return self._named(params, declared=True, used=False)
@@ -194,10 +194,10 @@ class Server:
         return self._named(params, declared=params.context.include_declaration, used=True)
 
     def highlight(self, params: types.DocumentHighlightParams) -> list[types.DocumentHighlight]:
-        declared = [each.range for each in self._named(params, declared=True, used=False)]
+        declared = [location.range for location in self._named(params, declared=True, used=False)]
         write, read = types.DocumentHighlightKind.Write, types.DocumentHighlightKind.Read
-        places = [each.range for each in self._named(params, declared=True, used=True)]
-        return [types.DocumentHighlight(each, write if each in declared else read) for each in places]
+        places = [location.range for location in self._named(params, declared=True, used=True)]
+        return [types.DocumentHighlight(place, write if place in declared else read) for place in places]
 
     def prepare_rename(self, params: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
         """Return the name at a place. Raises an error where it cannot be another one."""
@@ -230,7 +230,7 @@ class Server:
 
     def folding(self, params: types.FoldingRangeParams) -> list[types.FoldingRange]:
         document = self.documents.find(params.text_document.uri)
-        return [replies.folding(each) for each in document.text.folds()] if document is not None else []
+        return [replies.folding(fold) for fold in document.text.folds()] if document is not None else []
 
     async def formatting(
         self, params: types.DocumentFormattingParams | types.DocumentRangeFormattingParams

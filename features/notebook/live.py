@@ -17,7 +17,7 @@ EVERY = 0.5
 """Seconds between two pictures."""
 SPAN = 30.0
 """Seconds that the plots show."""
-LONGEST = 3600.0
+LONGEST_LIVE_PLOT = 3600.0
 """Seconds after which a picture that nobody closed ends: it reads drives."""
 HEADS = ("drive", "axis", "position", "velocity", "in units", "read")
 
@@ -50,7 +50,7 @@ class LivePicture:
 
     def _run(self) -> None:
         with contextlib.suppress(Diagnostic, TransportLost):  # the session is closed, or its line is gone
-            for _ in range(int(LONGEST / EVERY)):
+            for _ in range(int(LONGEST_LIVE_PLOT / EVERY)):
                 ended = self._over.wait(EVERY)
                 self._rows += self._readings.samples()
                 while self._rows and self._rows[0].elapsed < self._rows[-1].elapsed - SPAN:

@@ -10,7 +10,7 @@ from multidrop.api.drives import DriveFacts
 from multidrop.api.sessions import AsyncSession, Run
 from multidrop.api.telemetry import Sample, Samples
 
-ROWS = 200
+MOST_ROWS = 200
 """The largest number of rows of a table."""
 WIDTH, HEIGHT = 640, 160
 """The size of a plot, pixels."""
@@ -25,8 +25,8 @@ Curve = tuple[str, Sequence[float], Sequence[float]]
 def table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table; of a long one the first rows."""
     head = "".join(f"<th>{escape(each)}</th>" for each in heads)
-    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows[:ROWS])
-    more = f"<tr><td colspan='{len(heads)}'>and {len(rows) - ROWS} more</td></tr>" if len(rows) > ROWS else ""
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows[:MOST_ROWS])
+    more = f"<tr><td colspan='{len(heads)}'>and {len(rows) - MOST_ROWS} more</td></tr>" if len(rows) > MOST_ROWS else ""
     return f"<table><caption>{escape(caption)}</caption><tr>{head}</tr>{body}{more}</table>"
 
 

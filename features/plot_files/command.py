@@ -49,8 +49,8 @@ async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[
         try:
             await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for each in waits:
-                each.cancel()
+            for wait in waits:
+                wait.cancel()
         raise lost(workspace) or DriveError(plot.failure)
     finally:
         write(sys.stderr, await running.end())

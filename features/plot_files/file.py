@@ -25,7 +25,7 @@ if sys.platform != "win32":
 APPLICATION = "multidrop"
 FLUSH = 5.0
 """The time of a flush, s, after which the receiver counts as gone."""
-GAP = 1.0
+SESSION_GAP = 1.0
 """The gap in `elapsed` between old and new samples of a file, s."""
 _FULL = 1 << 17
 """The free space below which a disk counts as full, bytes."""
@@ -114,13 +114,13 @@ class RecordingFile(Locked):
                 self._join(None)
             except SinkBroken as error:
                 raise Diagnostic(f"cannot add {self.part}, which a plot left: {error}") from None
-        end = -GAP
+        end = -SESSION_GAP
         for chunk in _chunks(self.path):
             self.paths.add(str(chunk.entity_path))
             if "elapsed" in chunk.timeline_names:
-                times = [each.value for each in chunk.to_record_batch().column("elapsed") if each.is_valid]
-                end = max(end, max(times, default=-GAP * 1e9) / 1e9)
-        self.offset = end + GAP
+                times = [value.value for value in chunk.to_record_batch().column("elapsed") if value.is_valid]
+                end = max(end, max(times, default=-SESSION_GAP * 1e9) / 1e9)
+        self.offset = end + SESSION_GAP
 
     def mark(self) -> None:
         with contextlib.suppress(OSError):
@@ -174,14 +174,14 @@ def _identity(path: Path) -> str:
 
     try:
         reader = RrdReader(str(path))
-        found, layouts = reader.recordings(), reader.blueprints()
+        recording, layouts = reader.recordings(), reader.blueprints()
     except RuntimeError as error:
         last = str(error).split(": ", 1)[-1]  # the most specific part of rerun's chain of reasons
         raise Diagnostic(f"{path} cannot be added to: {last}", hint="use another file; this one is unchanged") from None
-    strange = [entry for entry in (*found, *layouts) if entry.application_id != APPLICATION]
-    if strange or len(found) > 1 or (layouts and not found):
+    strange = [entry for entry in (*recording, *layouts) if entry.application_id != APPLICATION]
+    if strange or len(recording) > 1 or (layouts and not recording):
         raise Diagnostic(f"{path} is not a plot of multidrop", hint="use another file; this one is unchanged")
-    return str(found[0].recording_id) if found else ""
+    return str(recording[0].recording_id) if recording else ""
 
 
 def _chunks(path: Path) -> Iterator[Any]:

@@ -29,10 +29,10 @@ class PlotOptions:
     def __post_init__(self) -> None:
         if self.rate in (None, MAX):
             return
-        from multidrop.drives.telemetry import FASTEST
+        from multidrop.drives.telemetry import SHORTEST_PERIOD
 
-        if not SLOWEST <= (real(self.rate or "") or 0.0) <= 1 / FASTEST:
-            valid = f"valid: {SLOWEST:g} to {1 / FASTEST:g} samples a second of each drive, or {MAX}"
+        if not SLOWEST <= (real(self.rate or "") or 0.0) <= 1 / SHORTEST_PERIOD:
+            valid = f"valid: {SLOWEST:g} to {1 / SHORTEST_PERIOD:g} samples a second of each drive, or {MAX}"
             raise Diagnostic(f"invalid rate {self.rate!r}", "--rate", valid)
 
     @property
@@ -46,8 +46,8 @@ class PlotOptions:
 
     @property
     def shown(self) -> str:
-        from multidrop.drives.telemetry import FASTEST
+        from multidrop.drives.telemetry import SHORTEST_PERIOD
 
-        if self.period <= FASTEST:
+        if self.period <= SHORTEST_PERIOD:
             return "as fast as the line allows"
         return f"at most {1 / self.period:g} samples a second of each drive"

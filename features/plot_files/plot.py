@@ -19,14 +19,14 @@ from multidrop.base.text import counted
 from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
-from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
+from multidrop.drives.telemetry import MODEST, READ_PERIOD, DriveValue, Subscription, Telemetry
 from multidrop.features.plot_files.file import SinkBroken
 from multidrop.features.plot_files.options import PlotOptions
 from multidrop.features.plot_files.request import TABLES, PlotTarget
 from multidrop.features.plot_files.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, Sink
 from multidrop.features.plot_files.table import TableSink
 from multidrop.shell import events
-from multidrop.shell.plots.batch import TWIN, Batch, Curve, State
+from multidrop.shell.plots.batch import TWIN, Batch, PlottedCurve, StateLane
 from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
 from multidrop.shell.session import Session
 from multidrop.shell.threads import in_thread
@@ -56,15 +56,15 @@ class Plot:
         self._begin = clock() - sink.offset
         self._epoch = self._at_zero()
         self._batch = Batch()
-        self._curves: set[Curve] = set()
+        self._curves: set[PlottedCurve] = set()
         """The curves that have samples."""
-        self._states: dict[State, str] = {}
+        self._states: dict[StateLane, str] = {}
         """The last state of each lane."""
         self._closing = asyncio.Event()
         self._on_failure: list[Callable[[str], None]] = []
         self.target = sink.target
         """The target, with the port that is in use."""
-        self._in_units: set[Curve] = set()
+        self._in_units: set[PlottedCurve] = set()
         """The curves in units of which no end was recorded."""
         self.samples = 0
         """The number of samples taken."""
@@ -98,26 +98,26 @@ class Plot:
         if not self._done:
             self.samples += 1
             drive = (bus, sample.address, sample.axis)
-            self._point(Curve(*drive, "position"), sample.at, sample.position)
-            self._point(Curve(*drive, "velocity"), sample.at, sample.velocity)
+            self._point(PlottedCurve(*drive, "position"), sample.at, sample.position)
+            self._point(PlottedCurve(*drive, "velocity"), sample.at, sample.velocity)
 
     def in_units(self, bus: str, sample: Sample, word: str, value: float, unit: str) -> None:
         """Take a quantity of a sample in the unit of its axis, too."""
         if not self._done:
-            curve = Curve(bus, sample.address, sample.axis, word, unit=unit)
+            curve = PlottedCurve(bus, sample.address, sample.axis, word, unit=unit)
             self._in_units.add(curve)
             self._point(curve, sample.at, value)
 
     def not_in_units(self, bus: str, sample: Sample) -> None:
         """End the curves of an axis in its unit: its scale does not hold."""
-        for curve in [each for each in self._in_units if each[:3] == (bus, sample.address, sample.axis)]:
+        for curve in [unit for unit in self._in_units if unit[:3] == (bus, sample.address, sample.axis)]:
             self._in_units.remove(curve)
             self._batch.gaps.setdefault(curve, []).append(self._times(sample.at))
 
     def value(self, bus: str, read: Valued) -> None:
         if not self._done:
             self.samples += 1
-            self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
+            self._point(PlottedCurve(bus, read.address, "", read.word), read.at, read.value)
 
     def predicted(self, bus: str, twin: events.Predicted, *, alone: bool = False) -> None:
         """Take a prediction of a drive's twin; `alone`: the difference only."""
@@ -125,9 +125,9 @@ class Plot:
             self.samples += alone
             drive = (bus, twin.address, twin.axis)
             for word, value in [("position", twin.position), ("velocity", twin.velocity)] if not alone else []:
-                self._point(Curve(*drive, word, twin=True), twin.at, value)
-            self._point(Curve(*drive, DIFFERENCE, twin=True), twin.at, twin.difference)
-            if self._states.get(State(*drive, TWIN), "") == "":
+                self._point(PlottedCurve(*drive, word, twin=True), twin.at, value)
+            self._point(PlottedCurve(*drive, DIFFERENCE, twin=True), twin.at, twin.difference)
+            if self._states.get(StateLane(*drive, TWIN), "") == "":
                 self.state(*drive, TWIN, twin.at, RUNS)
 
     def twin_ended(self, bus: str, address: str, at: float) -> None:
@@ -138,13 +138,13 @@ class Plot:
             if (*lane[:2], lane.name) == (bus, address, TWIN):
                 self.state(*lane, at, "")
 
-    def _point(self, curve: Curve, at: float, value: float) -> None:
+    def _point(self, curve: PlottedCurve, at: float, value: float) -> None:
         self._curves.add(curve)
         self._batch.curves.setdefault(curve, []).append((*self._times(at), float(value)))
 
     def state(self, bus: str, address: str, axis: str, name: str, at: float, text: str) -> None:
         """Take a state; one that has not changed takes no room."""
-        lane = State(bus, address, axis, name)
+        lane = StateLane(bus, address, axis, name)
         if not self._done and self._states.get(lane) != text:
             self._states[lane] = text
             self._batch.states.setdefault(lane, []).append((*self._times(at), text))
@@ -344,9 +344,9 @@ def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], 
     elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
         plot.value(bus, inner)
     elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
-        for each in inner.conditions:
-            for name, state in states_of(each):
-                plot.state(bus, inner.address, each.axis, name, inner.at, state)
+        for condition in inner.conditions:
+            for name, state in states_of(condition):
+                plot.state(bus, inner.address, condition.axis, name, inner.at, state)
     elif isinstance(inner, Lost) and bus in buses:
         plot.gap(bus, inner.at)
     elif isinstance(inner, Unsolicited) and bus in buses:
@@ -382,8 +382,8 @@ def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Ite
             yield telemetry.watch(addresses, len(addresses) * STATES).close
         else:
             yield from _sparing(telemetry, addresses)
-    if values := [Value(each.address, each.word) for each in series if not each.of_motion]:
-        yield telemetry.read(values, max(period, USUAL)).close
+    if values := [DriveValue(each.address, each.word) for each in series if not each.of_motion]:
+        yield telemetry.read(values, max(period, READ_PERIOD)).close
 
 
 def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callable[[], None]]:

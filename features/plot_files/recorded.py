@@ -27,19 +27,19 @@ def read(file: str | Path, twin: bool) -> Samples:
     rows: dict[Key, dict[str, float]] = {}
     for drive, axis, what, elapsed, wall, value in _values(path, twin):
         rows.setdefault((elapsed, drive, axis), {"time": wall})[what] = value
-    whole = (each for each in sorted(rows.items()) if all(what in each[1] for what in QUANTITIES))
-    found = Samples(
+    whole = (row for row in sorted(rows.items()) if all(what in row[1] for what in QUANTITIES))
+    samples = Samples(
         Sample(elapsed, row["time"], drive, axis, int(row["position"]), int(row["velocity"]))
         for (elapsed, drive, axis), row in whole
     )
-    if not found:
+    if not samples:
         missing, hint = (
             ("twins", "/twin on, then /plot --to FILE.rrd")
             if twin
             else ("multidrop", "multidrop plot URL --to FILE.rrd")
         )
         raise Diagnostic(f"has no samples of {missing}", str(path), f"{hint} writes such a file")
-    return found
+    return samples
 
 
 def _values(path: Path, twin: bool) -> Iterator[tuple[str, str, str, float, float, float]]:

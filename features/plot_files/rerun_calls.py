@@ -23,9 +23,9 @@ from typing import Any
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import why
-from multidrop.features.plot_files.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
+from multidrop.features.plot_files.file import APPLICATION, FLUSH, SESSION_GAP, RecordingFile, SinkBroken
 from multidrop.features.plot_files.request import PlotTarget, bracketed
-from multidrop.shell.plots.batch import TWIN, UNITS, Batch, Curve, State
+from multidrop.shell.plots.batch import TWIN, UNITS, Batch, PlottedCurve, StateLane
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.transports import Unreachable
 
@@ -35,7 +35,7 @@ STATE = "state"
 """The part of a path after which the name of a lane of states follows."""
 COLOURS = {"command": 0x2F8FD0FF, "reply": 0x808A90FF, "error": 0xE04848FF, "note": 0xB07D10FF}
 """The colour of a log line, by level; each can be read on a dark and on a light ground."""
-LINES = (0x3FA0E0FF, 0x009E73FF, 0xCC79A7FF, 0xD08C00FF, 0x7A6FD0FF, 0x808A90FF, 0x40B0A8FF, 0xA07850FF)
+LINE_COLOURS = (0x3FA0E0FF, 0x009E73FF, 0xCC79A7FF, 0xD08C00FF, 0x7A6FD0FF, 0x808A90FF, 0x40B0A8FF, 0xA07850FF)
 """The colours of drives, which people with any colour vision can tell apart. None is that of an error."""
 SHADES = {
     "on": 0x3FA0E0FF,
@@ -79,11 +79,11 @@ def _charts(rrb: Any, paths: Set[str], names: Mapping[str, str]) -> Any:
     if len(drives) == 1:
         return _column(rrb, _curves(paths), names.get(drives[0], drives[0]))
     together = _column(rrb, _curves(paths), "")
-    each = [
+    column = [
         _column(rrb, [path for path in _curves(paths) if _drive(path) == drive], names.get(drive, drive))
         for drive in drives
     ]
-    beside = rrb.Horizontal(*each, name="each drive")
+    beside = rrb.Horizontal(*column, name="each drive")
     few = len(drives) <= SIDE_BY_SIDE
     return rrb.Tabs(beside, together, active_tab=0 if few else 1)
 
@@ -235,7 +235,7 @@ class Sink:
         try:
             self._recording.flush(timeout_sec=FLUSH)
             if self.target.serves:
-                served = self._recording, self._paths, self._drives, self._end + GAP
+                served = self._recording, self._paths, self._drives, self._end + SESSION_GAP
                 _SERVED[self.target.host, self.target.port] = served
                 return
             self._recording.disconnect()
@@ -294,9 +294,9 @@ class Sink:
             self._paths |= new
             self._recording.send_blueprint(self._layout())
 
-    def _colour(self, curve: Curve) -> int:
+    def _colour(self, curve: PlottedCurve) -> int:
         """The colour of a drive's axis, the same in every view; those that a file has already keep theirs."""
-        return LINES[self._number(entity_path(self._rr, *curve.drive)) % len(LINES)]
+        return LINE_COLOURS[self._number(entity_path(self._rr, *curve.drive)) % len(LINE_COLOURS)]
 
     def _number(self, drive: str) -> int:
         if drive not in self._drives:
@@ -315,7 +315,7 @@ class Sink:
         self._recording.send_columns(entity_path(self._rr, *place), times, values, strict=True)
 
 
-def _place(state: State) -> tuple[str, ...]:
+def _place(state: StateLane) -> tuple[str, ...]:
     return (*state[:3], STATE, state.name)
 
 
@@ -328,10 +328,10 @@ viewer is connected, so it stays, and the next plot at that port continues it.""
 
 def _numeric(target: PlotTarget) -> PlotTarget:
     try:
-        found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        addresses = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:
         raise _unserved(target, error) from None
-    return replace(target, host=str(found[0][4][0]))
+    return replace(target, host=str(addresses[0][4][0]))
 
 
 def _free(target: PlotTarget) -> PlotTarget:

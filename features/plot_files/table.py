@@ -19,7 +19,7 @@ from typing import Any
 from multidrop.base.errors import Diagnostic
 from multidrop.base.parquet import pyarrow
 from multidrop.base.text import cell, visible
-from multidrop.features.plot_files.file import GAP, Locked, SinkBroken, disk_full, synced
+from multidrop.features.plot_files.file import SESSION_GAP, Locked, SinkBroken, disk_full, synced
 from multidrop.features.plot_files.request import PlotTarget
 from multidrop.shell.plots.batch import TWIN, Batch
 
@@ -27,7 +27,7 @@ COLUMNS = ("time", "elapsed", "bus", "drive", "axis", "name", "value", "unit", "
 """Time of day (UTC); seconds since the plot began; a quantity with its value and unit, or a state or a line with its
 text."""
 HEADER = ",".join(COLUMNS).encode() + b"\n"
-LAST = 1 << 16
+TAIL_BYTES = 1 << 16
 """The bytes at the end of a table in which its last row is looked for."""
 BLOCK = 1 << 20
 
@@ -43,7 +43,7 @@ class TableSink(Locked):
         self.writes = path.with_name(f"{path.stem}.part.csv") if self._parquet else path
         super().__init__(path)
         try:
-            end = max(_end(self.writes), _parquet_end(self._parquet, self.path) if self._parquet else -GAP)
+            end = max(_end(self.writes), _parquet_end(self._parquet, self.path) if self._parquet else -SESSION_GAP)
             self._file = self.writes.open("a", encoding="utf-8", newline="")
             if not self._file.tell():
                 self._file.write(HEADER.decode())
@@ -53,7 +53,7 @@ class TableSink(Locked):
         except Diagnostic:
             self.release()
             raise
-        self.offset = end + GAP
+        self.offset = end + SESSION_GAP
         """The first `elapsed`, s: after the rows that exist already."""
         self._good = 0
         self._rows = csv.writer(self._file, lineterminator="\n")
@@ -63,7 +63,7 @@ class TableSink(Locked):
         try:
             for elapsed, wall, *row in sorted(_rows(batch), key=lambda row: row[0]):
                 stamp = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-                cells = row if self._parquet else [cell(each) if isinstance(each, str) else each for each in row]
+                cells = row if self._parquet else [cell(value) if isinstance(value, str) else value for value in row]
                 self._rows.writerow((stamp, f"{elapsed:.4f}", *cells))
             self._file.flush()
             self._good = self._file.tell()
@@ -120,19 +120,19 @@ def _rows(batch: Batch) -> Iterator[tuple[Any, ...]]:
 def _end(path: Path) -> float:
     """The last `elapsed` of a CSV table; cut a row that a kill left in part. Raises Diagnostic for another file."""
     if not os.path.exists(path) or not path.stat().st_size:
-        return -GAP
+        return -SESSION_GAP
     with path.open("rb+") as file:
         if file.readline(len(HEADER)) != HEADER:
             raise _strange(path)
         size = file.seek(0, os.SEEK_END)
-        file.seek(max(len(HEADER), size - LAST))
+        file.seek(max(len(HEADER), size - TAIL_BYTES))
         whole = file.read().rpartition(b"\n")
         file.truncate(size - len(whole[2]))
         last = next(csv.reader([whole[0].rpartition(b"\n")[2].decode("utf-8", "replace")]), [])
     try:
         return float(last[1])
     except (IndexError, ValueError):  # no row
-        return -GAP
+        return -SESSION_GAP
 
 
 def _strange(path: Path) -> Diagnostic:
@@ -142,13 +142,13 @@ def _strange(path: Path) -> Diagnostic:
 def _parquet_end(pa: Any, path: Path) -> float:
     """The last `elapsed` of a Parquet table. Raises Diagnostic for another file."""
     if not path.stat().st_size:
-        return -GAP
+        return -SESSION_GAP
     try:
         with pa.parquet.ParquetFile(path) as file:
             if tuple(file.schema_arrow.names) != COLUMNS:
                 raise _strange(path)
             groups = (file.metadata.row_group(number).column(1) for number in range(file.num_row_groups))
-            return max((each.statistics.max for each in groups), default=-GAP)
+            return max((group.statistics.max for group in groups), default=-SESSION_GAP)
     except (pa.ArrowInvalid, AttributeError):
         raise _strange(path) from None
 

@@ -53,7 +53,7 @@ def _publish(
 def _plant(url: BrokerUrl, *, json: JsonObjects = False) -> int:
     from multidrop.features.publishing import watch
 
-    if json or not all(each.isatty() for each in (sys.stdin, sys.stdout, sys.stderr)):
+    if json or not all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr)):
         return watch.run(url, as_json=json)
     from multidrop.features.publishing.screen import run
 

@@ -87,7 +87,7 @@ def _prefix(text: str, where: str) -> str:
     prefix = text.removesuffix("/")
     if not prefix:
         raise Diagnostic("no PREFIX of the topics", where, FORM)
-    wrong = next((each for each in prefix if each in "+#?" or visible(each) != each), "")
+    wrong = next((character for character in prefix if character in "+#?" or visible(character) != character), "")
     if wrong:
         raise Diagnostic(f"a PREFIX has no {visible(wrong)!s}", where, FORM)
     if prefix.startswith("$") or "" in prefix.split("/"):
@@ -105,11 +105,11 @@ WINDOW = 100
 """Messages that may wait for their acknowledgement."""
 TIMEOUT = 15.0
 """The longest time to connect, and to be accepted, s."""
-LONGEST = 65535
+LONGEST_LOGIN = 65535
 """Bytes of a user or a password."""
 LEAVE = 1.0
 """The longest time to disconnect, s."""
-LARGEST = 4 << 20
+LARGEST_PACKET = 4 << 20
 """Bytes of a packet from a broker, at most."""
 KINDS = {0x20: "CONNACK", 0x30: "PUBLISH at QoS 0", 0x40: "PUBACK", 0x90: "SUBACK", 0xD0: "PINGRESP"}
 """The packets that a broker has a reason to send: none of them waits for a reply of ours, or is kept by paho."""
@@ -129,7 +129,7 @@ def fresh_name() -> str:
     return f"multidrop-{os.urandom(6).hex()}"
 
 
-class Message(NamedTuple):
+class BrokerMessage(NamedTuple):
     """A message for the broker. `bus`: the line that it is about; empty: none."""
 
     topic: str
@@ -142,11 +142,11 @@ Take = Callable[[str, bytes, bool], None]
 """Takes a topic, a payload, and whether the message was retained."""
 
 
-class Connection:
+class BrokerConnection:
     """One connection to a broker. `connect` makes it; it ends once, by `close` or by a loss."""
 
     def __init__(
-        self, target: Target, settings: MqttSettings, will: Message | None, name: str, take: Take | None = None
+        self, target: Target, settings: MqttSettings, will: BrokerMessage | None, name: str, take: Take | None = None
     ) -> None:
         """Make a connection that is not connected yet.
 
@@ -158,7 +158,7 @@ class Connection:
         self._loop = asyncio.get_running_loop()
         self._accepted: asyncio.Future[None] = self._loop.create_future()
         self._client: Client | None = None
-        self._sent: deque[tuple[Message, MQTTMessageInfo]] = deque()
+        self._sent: deque[tuple[BrokerMessage, MQTTMessageInfo]] = deque()
         self._full = False
         self.lost = asyncio.Event()
         """Set at the end of the connection."""
@@ -200,8 +200,8 @@ class Connection:
         user, secret = self._target.user or self._settings.username, self._settings.secret()
         if secret and not user:
             raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
-        if max(len(user.encode()), len(secret.encode())) > LONGEST:
-            raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
+        if max(len(user.encode()), len(secret.encode())) > LONGEST_LOGIN:
+            raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST_LOGIN} bytes")
         if user:
             client.username_pw_set(user, secret or None)
         client.tls_set_context(_context(self._settings) if self._target.encrypted else _Plain())
@@ -239,7 +239,7 @@ class Connection:
 
     def _subscribed(self, reasons: Sequence[Any]) -> None:
         refused = f"the broker at {self._where} does not let us read; its access list has to allow it"
-        self._call(self._settle, refused if any(each.is_failure for each in reasons) else "")
+        self._call(self._settle, refused if any(reason.is_failure for reason in reasons) else "")
 
     def _settle(self, refusal: str) -> None:
         """End the wait of `connect`; `refusal`: why it fails, empty where it does not."""
@@ -272,7 +272,7 @@ class Connection:
             self._full = False
             self._call(lambda: self.on_room())  # which another function may be by then
 
-    def publish(self, message: Message) -> bool:
+    def publish(self, message: BrokerMessage) -> bool:
         """Send a message; False while the connection is full or lost. Never blocks."""
         self._full = True  # before the count, which an acknowledgement may change meanwhile
         if self._client is None or self.lost.is_set() or len(self._unacknowledged()) >= WINDOW:
@@ -284,13 +284,13 @@ class Connection:
         self._full = False
         return True
 
-    def _unacknowledged(self) -> deque[tuple[Message, MQTTMessageInfo]]:
+    def _unacknowledged(self) -> deque[tuple[BrokerMessage, MQTTMessageInfo]]:
         """The messages in flight; a broker acknowledges in the order of sending."""
         while self._sent and self._sent[0][1].is_published():
             self._sent.popleft()
         return self._sent
 
-    def in_flight(self) -> list[Message]:
+    def in_flight(self) -> list[BrokerMessage]:
         return [message for message, _ in self._unacknowledged()]
 
     async def close(self) -> None:
@@ -349,8 +349,8 @@ class _Guarded:
         if len(self._head) > 1 and byte < 0x80:
             self._left = sum((each & 0x7F) << 7 * n for n, each in enumerate(self._head[1:]))
             self._head = b""
-            if self._left > LARGEST:
-                self._end(f"a packet of {self._left / 2**20:.0f} MB; the limit is {LARGEST >> 20} MB")
+            if self._left > LARGEST_PACKET:
+                self._end(f"a packet of {self._left / 2**20:.0f} MB; the limit is {LARGEST_PACKET >> 20} MB")
 
     def _end(self, what: str) -> None:
         self._refuse(what)
@@ -373,7 +373,7 @@ class _Plain:
         return _PlainSocket(fileno=made.detach())
 
 
-class _Socket(_Guarded, ssl.SSLSocket):
+class _BrokerSocket(_Guarded, ssl.SSLSocket):
     """A socket that is closed where its handshake fails; paho leaves it open."""
 
     def do_handshake(self, block: bool = False) -> None:
@@ -391,7 +391,7 @@ def _context(settings: MqttSettings) -> ssl.SSLContext:
     place = "mqtt.ca"
     try:
         context = ssl.create_default_context(cafile=settings.ca or None)
-        context.sslsocket_class = _Socket
+        context.sslsocket_class = _BrokerSocket
         place = "mqtt.cert"
         if settings.cert:  # an encrypted key is refused: no person is there to type its passphrase
             context.load_cert_chain(settings.cert, settings.key or None, password=lambda: "")

@@ -10,12 +10,12 @@ from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.text import counted
 from multidrop.drives.bus import Bus
 from multidrop.features.publishing import broker
-from multidrop.features.publishing.broker import Message, Target, parse_target
-from multidrop.features.publishing.feed import Feed, Topics
+from multidrop.features.publishing.broker import BrokerMessage, Target, parse_target
+from multidrop.features.publishing.feed import PublishingFeed, Topics
 from multidrop.features.publishing.listening import Listening, parse_listening
 from multidrop.features.publishing.opcua import UaServer
-from multidrop.features.publishing.prometheus import Endpoint
-from multidrop.features.publishing.publisher import Publisher
+from multidrop.features.publishing.prometheus import MetricsServer
+from multidrop.features.publishing.publisher import MessagePublisher
 from multidrop.features.publishing.registry import LOST, ONLINE, Outlet, Registry, parse_rate
 from multidrop.shell.batch import runner
 from multidrop.shell.events import FAILURES
@@ -25,9 +25,9 @@ from multidrop.shell.streams.stdout import write
 from multidrop.shell.workspace import Workspace
 from multidrop.transports.sockets import exposed
 
-AGAIN = 30.0
+RETRY_AFTER = 30.0
 """The time between two attempts to open a line that was not there, s."""
-SERVERS: Mapping[str, type[Endpoint] | type[UaServer]] = {"prometheus": Endpoint, "opcua": UaServer}
+SERVERS: Mapping[str, type[MetricsServer] | type[UaServer]] = {"prometheus": MetricsServer, "opcua": UaServer}
 """The outlets that listen, by scheme."""
 
 
@@ -42,14 +42,14 @@ def run(
     targets, period = [*map(_parse, to)], parse_rate(rate)
     if len({*targets}) < len(targets):
         raise Diagnostic("given twice", "--to", "name each target once")
-    if home_assistant and not any(isinstance(each, Target) for each in targets):
+    if home_assistant and not any(isinstance(target, Target) for target in targets):
         raise Diagnostic("goes through a broker, and none is named", "--home-assistant", "--to mqtt://BROKER/PREFIX")
-    for each in targets:
-        (SERVERS[each.scheme] if isinstance(each, Listening) else broker).load()
+    for target in targets:
+        (SERVERS[target.scheme] if isinstance(target, Listening) else broker).load()
 
     async def body(session: Session) -> None:
         registry = Registry(session, period)
-        registry.outlets += [_outlet(registry, each, home_assistant) for each in targets]
+        registry.outlets += [_outlet(registry, target, home_assistant) for target in targets]
         await _publish(registry, urls, reconnect)
 
     return runner.run([], body, interrupted=0, reconnect=reconnect, replies=False)
@@ -58,7 +58,7 @@ def run(
 def _parse(text: str) -> Target | Listening:
     scheme = text.partition("://")[0]
     if scheme not in (*SERVERS, *broker.PORTS):
-        hint = ", ".join((broker.FORM, *(f"{each}://[HOST]:PORT" for each in SERVERS)))
+        hint = ", ".join((broker.FORM, *(f"{server}://[HOST]:PORT" for server in SERVERS)))
         raise Diagnostic("a target begins with its scheme", "--to", hint)
     return parse_listening(text) if scheme in SERVERS else parse_target(text)
 
@@ -70,13 +70,13 @@ def _outlet(registry: Registry, target: Target | Listening, home_assistant: bool
     topics, settings, name = Topics(target.prefix), session.settings.section("mqtt"), broker.fresh_name()
     if not target.encrypted and (settings.password or settings.password_file) and exposed(target.host):
         registry.warn(f"the password goes to {target.host} unencrypted; mqtts:// encrypts it")
-    publisher = Publisher(
-        lambda: broker.Connection(target, settings, Message(topics.status, LOST, retain=True), name),
-        Message(topics.status, ONLINE, retain=True),
+    publisher = MessagePublisher(
+        lambda: broker.BrokerConnection(target, settings, BrokerMessage(topics.status, LOST, retain=True), name),
+        BrokerMessage(topics.status, ONLINE, retain=True),
         registry.warn,
         lambda numbers: feed.dropped(numbers),
     )
-    feed = Feed(registry, publisher, topics, target.text, home_assistant)
+    feed = PublishingFeed(registry, publisher, topics, target.text, home_assistant)
     return feed
 
 
@@ -102,8 +102,8 @@ async def _publish(registry: Registry, urls: Sequence[str], reconnect: bool) -> 
         assert loss is not None
         raise loss
     finally:
-        for each in waits:
-            each.cancel()
+        for wait in waits:
+            wait.cancel()
         registry.end()
         for outlet in outlets:
             write(sys.stderr, *filter(None, [await outlet.end()]))
@@ -116,7 +116,7 @@ async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list
     """
     failures: dict[int, BaseException] = {}
     await session.open_all(urls, failures.__setitem__)
-    fatal = [each for each in failures.values() if isinstance(each, Diagnostic)]
+    fatal = [failure for failure in failures.values() if isinstance(failure, Diagnostic)]
     none_open = len(failures) == len(urls)
     if failures and (fatal or none_open or not later):
         raise [*fatal, *failures.values()][0]
@@ -124,13 +124,13 @@ async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list
     for number in sorted(failures):
         url, reason = url_without_secrets(urls[number]), str(failures[number])
         where = "" if url.partition("?")[0] in reason else f"{url}: "
-        session.notify(f"{where}{reason}; tried again every {AGAIN:g} s", warning=True)
+        session.notify(f"{where}{reason}; tried again every {RETRY_AFTER:g} s", warning=True)
     return absent
 
 
 async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> None:
     while True:
-        await asyncio.sleep(AGAIN)
+        await asyncio.sleep(RETRY_AFTER)
         try:
             opened = await session.open(url)
         except FAILURES:

@@ -20,11 +20,11 @@ import multidrop
 from multidrop.base.text import counted, visible
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
-from multidrop.features.publishing.broker import Message
-from multidrop.features.publishing.publisher import Publisher
-from multidrop.features.publishing.registry import BYE, ONLINE, Fields, Key, Outlet, Registry, Value
+from multidrop.features.publishing.broker import BrokerMessage
+from multidrop.features.publishing.publisher import MessagePublisher
+from multidrop.features.publishing.registry import BYE, ONLINE, Fields, Outlet, PublishedValue, Registry, ValueKey
 from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 from multidrop.shell.streams.stdout import shortened
 
 RESERVED = "+#/%"
@@ -42,7 +42,8 @@ def escape(name: str) -> str:
         return UNNAMED if not name else _percent(name)
     first = _percent("$") if name.startswith("$") else ""
     return first + "".join(
-        _percent(each) if each in RESERVED or not _plain(each) else each for each in name[bool(first) :]
+        _percent(character) if character in RESERVED or not _plain(character) else character
+        for character in name[bool(first) :]
     )
 
 
@@ -91,32 +92,32 @@ def shown_name(bus: Bus) -> str:
 
 def value_text(time: datetime, fields: Fields) -> str:
     """A value with its time. An axis without a name is left out."""
-    found = {name: each for name, each in fields.items() if (name, each) != ("axis", "")}
-    return json.dumps({"time": time.isoformat(timespec="microseconds"), **found})
+    filled = {name: each for name, each in fields.items() if (name, each) != ("axis", "")}
+    return json.dumps({"time": time.isoformat(timespec="microseconds"), **filled})
 
 
-def line_text(entry: Entry) -> str:
+def line_text(entry: LogEntry) -> str:
     """A line of a transcript: an entry of the session log, shortened."""
     return line_of(replace(entry, text=shortened(entry.text))).decode().rstrip("\n")
 
 
 UNCHANGED = 5.0
 """The time after which a value that has not changed is published again, s."""
-LINES = 20.0
+RATE = 20.0
 """Lines a second of one transcript."""
 BURST = 100.0
 """Lines of one transcript that are published at once after a pause."""
 
 
 @dataclass
-class Curve:
+class PublishedCurve:
     """The published points of one value."""
 
-    shown: Value | None = None
-    held: Value | None = None
+    shown: PublishedValue | None = None
+    held: PublishedValue | None = None
     """The newest point that was not published, as its value was that of the one before."""
 
-    def take(self, point: Value) -> Iterator[Value]:
+    def take(self, point: PublishedValue) -> Iterator[PublishedValue]:
         """Yield the points to publish now.
 
         A change is published with the point before it, so that a chart shows when it began.
@@ -141,7 +142,7 @@ class LineLimit:
 
     def passes(self, now: float) -> bool:
         """Whether a line is published now; count it either way."""
-        self.left = min(BURST, self.left + (now - self.at) * LINES)
+        self.left = min(BURST, self.left + (now - self.at) * RATE)
         self.at = now
         if self.left < 1:
             self.dropped += 1
@@ -151,9 +152,9 @@ class LineLimit:
 
     def missing(self, now: float) -> int:
         """The number of dropped lines, once one may be published in their place; 0 otherwise."""
-        if not self.dropped or self.left + (now - self.at) * LINES < 1:
+        if not self.dropped or self.left + (now - self.at) * RATE < 1:
             return 0
-        self.left, self.at = self.left + min(BURST, (now - self.at) * LINES) - 1, now
+        self.left, self.at = self.left + min(BURST, (now - self.at) * RATE) - 1, now
         dropped, self.dropped = self.dropped, 0
         return dropped
 
@@ -166,7 +167,9 @@ AVAILABLE = "{{ 'online' if value == 'online' else 'offline' }}"
 MEASURED = ("position", "velocity")
 
 
-def sensor(key: Key, value: Value, topic: str, available: tuple[str, ...], period: float, product: str) -> Message:
+def sensor(
+    key: ValueKey, value: PublishedValue, topic: str, available: tuple[str, ...], period: float, product: str
+) -> BrokerMessage:
     """Make the message that describes the sensor of a value.
 
     `topic`: of the value. `available`: the topics that say `online` while values are current.
@@ -191,30 +194,35 @@ def sensor(key: Key, value: Value, topic: str, available: tuple[str, ...], perio
         **({"unit_of_measurement": str(value.fields["unit"])} if quantity else {}),
     }
     name = f"{re.sub('[^a-zA-Z0-9_-]+', '-', identity)}-{zlib.crc32(identity.encode()):08x}"
-    return Message(f"{PREFIX}/sensor/{name}/config", json.dumps(config), retain=True, bus=key.bus)
+    return BrokerMessage(f"{PREFIX}/sensor/{name}/config", json.dumps(config), retain=True, bus=key.bus)
 
 
 KINDS = {Entered: "typed", Printed: "printed", Notified: "notice", Failed: "failed"}
 RETAINED = ("state", "error")
-LOOK = 1.0
+LOOK_PERIOD = 1.0
 """Seconds between two looks at what waits."""
 HEARTBEAT = 30.0
 """Seconds between two messages of each state: a broker may publish the will of an earlier process late."""
 
 
-class Feed(Outlet):
+class PublishingFeed(Outlet):
     """Makes messages for a publisher of the values of a registry and the lines of a session's transcript."""
 
     def __init__(
-        self, registry: Registry, publisher: Publisher, topics: Topics, text: str = "", home_assistant: bool = False
+        self,
+        registry: Registry,
+        publisher: MessagePublisher,
+        topics: Topics,
+        text: str = "",
+        home_assistant: bool = False,
     ) -> None:
         """`text`: the URL of the broker. `home_assistant`: describe each value as a sensor, too."""
         self._registry, self._session, self._described = registry, registry.session, home_assistant
         self._publisher, self._topics, self.text = publisher, topics, text
         self._named: dict[str, str] = {}
         """The names of the lines, as a person knows them, by those in the topics."""
-        self._curves: defaultdict[Key, Curve] = defaultdict(Curve)
-        self._sensors: dict[Key, tuple[object, ...]] = {}
+        self._curves: defaultdict[ValueKey, PublishedCurve] = defaultdict(PublishedCurve)
+        self._sensors: dict[ValueKey, tuple[object, ...]] = {}
         """What Home Assistant was told of each value: its unit, and the product."""
         self._limits: defaultdict[str, LineLimit] = defaultdict(LineLimit)
         self._leave: Callable[[], None] = lambda: None
@@ -232,7 +240,7 @@ class Feed(Outlet):
         self._leave()
         self._task.cancel()
         publisher = self._publisher
-        await publisher.end(Message(self._topics.status, BYE, retain=True))
+        await publisher.end(BrokerMessage(self._topics.status, BYE, retain=True))
         parts = [f"{counted(publisher.sent, 'message')} published"]
         parts += [f"{publisher.lost} dropped, as they had no room"] if publisher.lost else []
         parts += [f"{publisher.waiting} not sent: the broker is away"] if publisher.waiting else []
@@ -245,11 +253,11 @@ class Feed(Outlet):
 
     def _say_about(self) -> None:
         """Say which program publishes here, and the names of its lines."""
-        self._named = {each.name: shown_name(each) for each in self._session.buses.values()}
+        self._named = {bus.name: shown_name(bus) for bus in self._session.buses.values()}
         about = {"version": multidrop.__version__, "host": socket.gethostname(), "lines": self._named}
-        self._publisher.put(Message(self._topics.about, json.dumps(about), retain=True))
+        self._publisher.put(BrokerMessage(self._topics.about, json.dumps(about), retain=True))
 
-    def value(self, key: Key, value: Value) -> None:
+    def value(self, key: ValueKey, value: PublishedValue) -> None:
         """Publish a value; state and error of the drive alone, and a number that rests now and then."""
         retain = key.what in RETAINED
         if retain and key.axis:
@@ -257,10 +265,10 @@ class Feed(Outlet):
         topic = self._topics.drive(key.bus, key.address, key.what)
         if self._described:
             self._describe(key, value, topic)
-        for each in (value,) if retain else self._curves[key].take(value):
-            self._put(topic, value_text(each.time, each.fields), key.bus, retain)
+        for published in (value,) if retain else self._curves[key].take(value):
+            self._put(topic, value_text(published.time, published.fields), key.bus, retain)
 
-    def _describe(self, key: Key, value: Value, topic: str) -> None:
+    def _describe(self, key: ValueKey, value: PublishedValue, topic: str) -> None:
         drive = self._session.buses[key.bus].drives.get(key.address)
         if drive is None or self._sensors.get(key) == (facts := (value.fields.get("unit"), drive.product)):
             return
@@ -275,23 +283,23 @@ class Feed(Outlet):
                 self._missing(bus, f"{missing} missing before this: no room was left while the broker was away")
 
     def _put(self, topic: str, text: str, bus: str, retain: bool = False) -> None:
-        self._publisher.put(Message(topic, text, retain, bus))
+        self._publisher.put(BrokerMessage(topic, text, retain, bus))
 
     async def _looking(self) -> None:
         """Look at what waits, and repeat the states now and then, until cancelled."""
         while True:
-            for _ in range(round(HEARTBEAT / LOOK)):
-                await asyncio.sleep(LOOK)
+            for _ in range(round(HEARTBEAT / LOOK_PERIOD)):
+                await asyncio.sleep(LOOK_PERIOD)
                 now = self._session.now()
                 for bus, limit in self._limits.items():
                     if number := limit.missing(now):
                         self._missing(
                             bus,
-                            f"{counted(number, 'line is', 'lines are')} missing here: {LINES:g} a second are published",
+                            f"{counted(number, 'line is', 'lines are')} missing here: {RATE:g} a second are published",
                         )
                 self._publisher.look()
             if self._publisher.connected:
-                self._publisher.put(Message(self._topics.status, ONLINE, retain=True))
+                self._publisher.put(BrokerMessage(self._topics.status, ONLINE, retain=True))
                 for bus, word in self._registry.words.items():
                     self.line(bus, word)
 
@@ -312,9 +320,9 @@ class Feed(Outlet):
     ) -> None:
         """Publish a line of a transcript, within its limit."""
         if bus in self._registry.words and self._limits[bus].passes(self._session.now()):
-            entry = Entry(self._session.wall(at), kind, text, bus, drive, by, warning=warning)
+            entry = LogEntry(self._session.wall(at), kind, text, bus, drive, by, warning=warning)
             self._put(self._topics.transcript(bus), line_text(entry), bus)
 
     def _missing(self, bus: str, text: str) -> None:
-        entry = Entry(self._session.wall(self._session.now()), "missing", text, bus, warning=True)
+        entry = LogEntry(self._session.wall(self._session.now()), "missing", text, bus, warning=True)
         self._put(self._topics.transcript(bus), line_text(entry), bus)

@@ -31,10 +31,10 @@ class Listening(NamedTuple):
     async def taken(self, notify: Callable[[str], None]) -> tuple[Listening, socket.socket]:
         """Return a socket that listens, and its place; warn of one for other machines. Raises Unreachable."""
         try:
-            found = await asyncio.get_running_loop().getaddrinfo(
+            addresses = await asyncio.get_running_loop().getaddrinfo(
                 self.host, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
             )
-            family, _, _, _, address = found[0]
+            family, _, _, _, address = addresses[0]
             listener = socket.create_server(address, family=family, backlog=16)
         except (OSError, UnicodeError) as error:
             why = explain(error) if isinstance(error, OSError) else "invalid host name"

@@ -18,7 +18,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.on_demand import importing
 from multidrop.features.publishing.feed import escape
 from multidrop.features.publishing.listening import Listening
-from multidrop.features.publishing.registry import Key, Outlet, Registry, Value
+from multidrop.features.publishing.registry import Outlet, PublishedValue, Registry, ValueKey
 from multidrop.transports import Unreachable
 from multidrop.transports.sockets import explain
 
@@ -26,7 +26,7 @@ INSTALL = "pip install 'multidrop[opcua]'"
 NAMESPACE = "urn:multidrop"
 CLIENTS = 16
 """Connections at a time."""
-LONGEST = 1 << 20
+LONGEST_MESSAGE = 1 << 20
 """Bytes of a message from a client."""
 VARIABLES = {
     "position": (
@@ -59,7 +59,7 @@ class UaServer(Outlet):
         """The index of our namespace."""
         self._nodes: dict[tuple[str, ...], Any] = {}
         """Objects and variables by their path."""
-        self._changed: dict[Key, None] = {}
+        self._changed: dict[ValueKey, None] = {}
         self._wake = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
@@ -77,7 +77,7 @@ class UaServer(Outlet):
             """A connection that ends where a client sends more than any message has: the library has no bound."""
 
             def data_received(self, data: bytes) -> None:
-                if len(self._buffer) > LONGEST:
+                if len(self._buffer) > LONGEST_MESSAGE:
                     self.transport.abort()
                 else:
                     super().data_received(data)
@@ -90,10 +90,10 @@ class UaServer(Outlet):
         from asyncua.crypto.permission_rules import PermissionRuleset
 
         allowed = {
-            ua.NodeId(getattr(ua.ObjectIds, f"{each}Request_Encoding_DefaultBinary")) for each in SERVICES.split()
+            ua.NodeId(getattr(ua.ObjectIds, f"{service}Request_Encoding_DefaultBinary")) for service in SERVICES.split()
         }
 
-        class Reading(PermissionRuleset):  # type: ignore[misc]
+        class ReadOnlyRules(PermissionRuleset):  # type: ignore[misc]
             """The services for clients, whoever they say they are."""
 
             def check_validity(self, user: object, action_type: object, body: object) -> bool:
@@ -107,11 +107,11 @@ class UaServer(Outlet):
         await server.set_application_uri(NAMESPACE)
         await server.set_build_info(NAMESPACE, "multidrop", "multidrop", multidrop.__version__, "", _now())
         server.set_endpoint(f"opc.tcp://{self.text.partition('://')[2]}/multidrop")
-        server.set_security_policy([ua.SecurityPolicyType.NoSecurity], Reading())
+        server.set_security_policy([ua.SecurityPolicyType.NoSecurity], ReadOnlyRules())
         server.set_identity_tokens([ua.AnonymousIdentityToken])
         server.allow_remote_admin(False)
         server.iserver.max_connections = CLIENTS
-        server.limits.max_message_size, server.limits.max_chunk_count = LONGEST, LONGEST // 65535 + 1
+        server.limits.max_message_size, server.limits.max_chunk_count = LONGEST_MESSAGE, LONGEST_MESSAGE // 65535 + 1
         self._space = await server.register_namespace(f"{NAMESPACE}:values")
         listener.close()
         try:
@@ -122,13 +122,13 @@ class UaServer(Outlet):
         self._task = asyncio.get_running_loop().create_task(self._write_changes())
 
     def line(self, bus: str, word: str) -> None:
-        self._note(Key(bus, "", "line"))
+        self._note(ValueKey(bus, "", "line"))
 
-    def value(self, key: Key, value: Value) -> None:
+    def value(self, key: ValueKey, value: PublishedValue) -> None:
         self._note(key)
         if key.what == "state":  # its numbers may be of the past now, or no longer
-            for each in ("position", "velocity"):
-                if (number := key._replace(what=each)) in self._registry.values:
+            for quantity in ("position", "velocity"):
+                if (number := key._replace(what=quantity)) in self._registry.values:
                     self._note(number)
 
     async def end(self) -> str:
@@ -140,7 +140,7 @@ class UaServer(Outlet):
             await self._server.stop()
         return ""
 
-    def _note(self, key: Key) -> None:
+    def _note(self, key: ValueKey) -> None:
         self._changed[key] = None
         self._wake.set()
 

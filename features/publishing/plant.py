@@ -18,19 +18,19 @@ from multidrop.base.text import visible
 from multidrop.features.publishing.feed import UNNAMED
 from multidrop.features.publishing.registry import AT_REST, BYE, LOST, MOVING, NO_CURRENT, ONLINE, SILENT
 
-MOST, PUBLISHERS = 5000, 1000
+MOST_DRIVES, MOST_PUBLISHERS = 5000, 1000
 """Drives, and states of programs and lines, that are kept, and publishers; what comes beyond is counted."""
-LONGEST, TOPIC = 16384, 2000
+LONGEST_PAYLOAD, LONGEST_TOPIC = 16384, 2000
 """Bytes of a message that is read, and characters of its topic."""
 NAME, TEXT = 60, 200
 """Characters of a name, and of a text."""
-LINES = 200
+MOST_NAMED_LINES = 200
 """Lines of one publisher that are named."""
 AXES = 16
 """Axes of a drive."""
 SAMPLES = 500
 """Samples of the followed drive."""
-QUIET = 75.0
+SIGN_TIMEOUT = 75.0
 """Seconds without any message, after which a publisher is missed: it repeats its state every 30."""
 NUMBERS, VALUES = ("position", "velocity"), ("position", "velocity", "state", "error")
 PC_LOST, NO_SIGN, LINE_LOST, ERROR, UNKNOWN, ENDED = "PC lost", "no sign", "line lost", "error", "not known", "ended"
@@ -38,7 +38,7 @@ URGENCY = (PC_LOST, NO_SIGN, LINE_LOST, LOST, SILENT, ERROR, NO_CURRENT, UNKNOWN
 """The states of a drive, the worst first."""
 
 
-class Place(NamedTuple):
+class TopicPlace(NamedTuple):
     """A drive by the levels of its topic: its publisher, its line, and itself."""
 
     publisher: str
@@ -46,7 +46,7 @@ class Place(NamedTuple):
     drive: str = ""
 
 
-class Reading(NamedTuple):
+class ValueReading(NamedTuple):
     """A value, and when it arrived here; None: it was retained, so its age is unknown."""
 
     at: float | None
@@ -55,17 +55,17 @@ class Reading(NamedTuple):
     """The text of an error, the program of a state, or a number in its unit."""
 
 
-class Sample(NamedTuple):
+class PlantSample(NamedTuple):
     """A position or velocity of the followed drive, and when it arrived."""
 
     at: float
     what: str
     axis: str
-    reading: Reading
+    reading: ValueReading
 
 
 @dataclass
-class Publisher:
+class PlantPublisher:
     """A program that publishes. `host` is empty without an `about`."""
 
     host: str = ""
@@ -76,10 +76,10 @@ class Publisher:
     """When its last message arrived that was not retained."""
 
 
-class Row(NamedTuple):
+class PlantRow(NamedTuple):
     """A drive as it is shown, or a publisher that has none."""
 
-    place: Place
+    place: TopicPlace
     where: str
     """The publisher: its place under the topic, or its host."""
     line: str
@@ -102,18 +102,18 @@ class Plant:
     """The drives under a topic."""
 
     def __init__(self, prefix: str, began: float) -> None:
-        self.publishers: dict[str, Publisher] = {}
-        self.drives: dict[Place, dict[tuple[str, str], Reading]] = {}
+        self.publishers: dict[str, PlantPublisher] = {}
+        self.drives: dict[TopicPlace, dict[tuple[str, str], ValueReading]] = {}
         """The values of each, by what, and axis."""
         self.words: dict[str, str] = {}
         """The states of programs and lines, by the topic above `status`."""
         self.ignored: Counter[str] = Counter()
         """Messages that were not read, by the reason."""
-        self.followed: Place | None = None
-        self.samples: deque[Sample] = deque(maxlen=SAMPLES)
+        self.followed: TopicPlace | None = None
+        self.samples: deque[PlantSample] = deque(maxlen=SAMPLES)
         self._prefix, self._began = prefix, began
 
-    def follow(self, place: Place | None) -> None:
+    def follow(self, place: TopicPlace | None) -> None:
         """Keep the samples of one drive from now on."""
         if place != self.followed:
             self.followed = place
@@ -132,7 +132,7 @@ class Plant:
         """Take a message; one that nobody publishes on purpose is counted."""
         above, _, what = topic.rpartition("/")
         at = None if retained else now
-        if len(payload) > LONGEST or len(topic) > TOPIC:
+        if len(payload) > LONGEST_PAYLOAD or len(topic) > LONGEST_TOPIC:
             self.ignored["too long"] += 1
         elif what == "status":
             self._status(above, payload, at)
@@ -147,7 +147,7 @@ class Plant:
             self.words.pop(above, None)
         elif word not in (ONLINE, LOST, BYE):
             self.ignored["of no known form"] += 1
-        elif above in self.words or above in self.publishers or len(self.words) < MOST or self._beyond():
+        elif above in self.words or above in self.publishers or len(self.words) < MOST_DRIVES or self._beyond():
             self.words[above] = word
             if at is not None and (publisher := self.publishers.get(above)) is not None:
                 publisher.heard = at
@@ -158,31 +158,31 @@ class Plant:
             if any(place.publisher == above for place in self.drives):
                 self._publisher(above, at)
             return
-        found = _object(payload)
-        lines = found.get("lines")
-        lines = {str(each): each for each in lines} if isinstance(lines, list) else lines
-        if not isinstance(found.get("host"), str) or not isinstance(lines, dict):
+        about = _object(payload)
+        lines = about.get("lines")
+        lines = {str(line): line for line in lines} if isinstance(lines, list) else lines
+        if not isinstance(about.get("host"), str) or not isinstance(lines, dict):
             self.ignored["of no known form"] += 1
         elif (publisher := self._publisher(above, at)) is not None:
-            publisher.host, publisher.version = _name(found["host"]), _name(str(found.get("version"))[:NAME])
-            named = list(lines.items())[:LINES]
-            publisher.lines = {str(name)[:TEXT]: _name(each) for name, each in named if isinstance(each, str)}
+            publisher.host, publisher.version = _name(about["host"]), _name(str(about.get("version"))[:NAME])
+            named = list(lines.items())[:MOST_NAMED_LINES]
+            publisher.lines = {str(name)[:TEXT]: _name(value) for name, value in named if isinstance(value, str)}
 
     def _value(self, above: str, what: str, payload: bytes, at: float | None) -> None:
         levels = above.rsplit("/", 2)
         if len(levels) < 3:
             return
-        place = Place(*levels)
+        place = TopicPlace(*levels)
         if not payload:
             self.drives.pop(place, None)
             return
-        found = _object(payload)
-        value, axis = found.get("value"), found.get("axis", "")
+        fields = _object(payload)
+        value, axis = fields.get("value"), fields.get("axis", "")
         valid = isinstance(value, str) if what == "state" else _is_number(value)
         if not (valid and isinstance(axis, str)):
             self.ignored["of no known form"] += 1
             return
-        if place not in self.drives and (len(self.drives) >= MOST and not self._beyond()):
+        if place not in self.drives and (len(self.drives) >= MOST_DRIVES and not self._beyond()):
             return
         if self._publisher(place.publisher, at) is None:
             return
@@ -192,22 +192,24 @@ class Plant:
             self._beyond()
             return
         assert isinstance(value, str | int | float)
-        reading = Reading(at, _name(value) if isinstance(value, str) else value, _more(what, found))
+        reading = ValueReading(at, _name(value) if isinstance(value, str) else value, _more(what, fields))
         values[key] = reading
         if place == self.followed and at is not None and what in NUMBERS:
-            self.samples.append(Sample(at, *key, reading))
+            self.samples.append(PlantSample(at, *key, reading))
 
-    def _publisher(self, prefix: str, at: float | None) -> Publisher | None:
+    def _publisher(self, prefix: str, at: float | None) -> PlantPublisher | None:
         """Return a publisher, a new one while there is room."""
         inside = prefix == self._prefix or prefix.startswith(f"{self._prefix}/")
-        if not inside or (prefix not in self.publishers and len(self.publishers) >= PUBLISHERS and not self._beyond()):
+        if not inside or (
+            prefix not in self.publishers and len(self.publishers) >= MOST_PUBLISHERS and not self._beyond()
+        ):
             return None
-        found = self.publishers.setdefault(prefix, Publisher())
-        found.heard = found.heard if at is None else at
-        return found
+        publisher = self.publishers.setdefault(prefix, PlantPublisher())
+        publisher.heard = publisher.heard if at is None else at
+        return publisher
 
     def _beyond(self) -> bool:
-        self.ignored[f"beyond {MOST} drives"] += 1
+        self.ignored[f"beyond {MOST_DRIVES} drives"] += 1
         return False
 
     # Rows
@@ -218,12 +220,12 @@ class Plant:
         name = _name(prefix[len(self._prefix) + 1 :]) or publisher.host or "-"
         return name if publisher.host else f"{name} (no about)"
 
-    def rows(self, now: float) -> list[Row]:
+    def rows(self, now: float) -> list[PlantRow]:
         """All drives, the worst first, and the publishers without a drive."""
         wheres = {prefix: self.where(prefix) for prefix in self.publishers}
         rows = [self._row(place, values, wheres[place.publisher], now) for place, values in self.drives.items()]
         peopled = {place.publisher for place in self.drives}
-        bare = [Place(prefix) for prefix in self.publishers if prefix not in peopled]
+        bare = [TopicPlace(prefix) for prefix in self.publishers if prefix not in peopled]
         rows += [self._row(place, {}, wheres[place.publisher], now) for place in bare]
         return sorted(rows, key=lambda row: row.urgency)
 
@@ -232,9 +234,11 @@ class Plant:
         word, heard = self.words.get(prefix), self.publishers[prefix].heard
         if word in (LOST, BYE):
             return PC_LOST if word == LOST else ENDED
-        return NO_SIGN if now - (self._began if heard is None else heard) > QUIET else ONLINE
+        return NO_SIGN if now - (self._began if heard is None else heard) > SIGN_TIMEOUT else ONLINE
 
-    def _row(self, place: Place, values: Mapping[tuple[str, str], Reading], where: str, now: float) -> Row:
+    def _row(
+        self, place: TopicPlace, values: Mapping[tuple[str, str], ValueReading], where: str, now: float
+    ) -> PlantRow:
         state = self.program(place.publisher, now)
         if state == ONLINE:
             known = values.get(("state", ""))
@@ -244,7 +248,7 @@ class Plant:
         error = values.get(("error", ""))
         live = [reading.at for (what, _), reading in values.items() if what in NUMBERS and reading.at is not None]
         named = self.publishers[place.publisher].lines.get(place.line, unquote(place.line))
-        return Row(
+        return PlantRow(
             place,
             where,
             _name(named),
@@ -256,13 +260,13 @@ class Plant:
         )
 
 
-def _numbers(values: Mapping[tuple[str, str], Reading], what: str) -> Iterator[str]:
+def _numbers(values: Mapping[tuple[str, str], ValueReading], what: str) -> Iterator[str]:
     for (name, axis), reading in values.items():
         if name == what:
             yield f"{axis} {shown(reading)}".strip()
 
 
-def shown(reading: Reading) -> str:
+def shown(reading: ValueReading) -> str:
     """A number as it is shown: in its unit where it has one."""
     return reading.text or f"{reading.value:.10g}" if isinstance(reading.value, float | int) else reading.value
 
@@ -270,10 +274,10 @@ def shown(reading: Reading) -> str:
 def _object(payload: bytes) -> Mapping[str, Any]:
     """Parse an object of JSON; anything else is an empty one."""
     try:
-        found = json.loads(payload)
+        value = json.loads(payload)
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return value if isinstance(value, dict) else {}
 
 
 def _is_number(value: object) -> bool:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 INSTALL = "pip install 'multidrop[prometheus]'"
 CLIENTS = 16
 """Connections at a time; one more is closed at once."""
-PATIENCE = 5.0
+REQUEST_TIMEOUT = 5.0
 """Seconds for one request and its answer."""
-LONGEST = 16384
+LONGEST_HTTP_REQUEST = 16384
 """Bytes of the head of a request."""
 FRESH = 0.2
 """Seconds for which one text serves all who ask: many scrapers cost no more than one."""
@@ -32,7 +32,7 @@ GAUGES = {
 }
 
 
-class Endpoint(Outlet):
+class MetricsServer(Outlet):
     """The server. Its answers are made in the event loop, of what the registry has."""
 
     def __init__(self, registry: Registry, place: Listening) -> None:
@@ -59,7 +59,7 @@ class Endpoint(Outlet):
     async def listen(self) -> None:
         self._place, listener = await self._place.taken(self._registry.warn)
         self.text = self._place.text
-        self._server = await asyncio.start_server(self._serve, sock=listener, limit=LONGEST)
+        self._server = await asyncio.start_server(self._serve, sock=listener, limit=LONGEST_HTTP_REQUEST)
 
     async def end(self) -> str:
         if self._server is not None:
@@ -69,7 +69,7 @@ class Endpoint(Outlet):
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._clients += 1
         try:
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(REQUEST_TIMEOUT):
                 if self._clients <= CLIENTS:
                     head = await reader.readuntil(b"\r\n\r\n")
                     writer.write(self.answer(head.partition(b"\r\n")[0].decode("latin-1")))
@@ -112,8 +112,8 @@ class Endpoint(Outlet):
         up = GaugeMetricFamily("multidrop_line_up", "1: the line is open; 0: it is lost", labels=["line"])
         for bus, word in registry.words.items():
             up.add_metric([escape(bus)], float(word == ONLINE))
-        found: dict[str, Any] = {
-            each: GaugeMetricFamily(f"multidrop_{each}", GAUGES[each], labels=AXIS) for each in GAUGES
+        metrics: dict[str, Any] = {
+            gauge: GaugeMetricFamily(f"multidrop_{gauge}", GAUGES[gauge], labels=AXIS) for gauge in GAUGES
         }
         about = "1 for the state of a drive, or of an axis with a name; 0 for the others"
         states = GaugeMetricFamily("multidrop_state", about, labels=[*AXIS, "state"])
@@ -129,9 +129,9 @@ class Endpoint(Outlet):
                 continue
             if not registry.current(key):
                 continue
-            found[key.what].add_metric(labels, float(fields["value"]))
+            metrics[key.what].add_metric(labels, float(fields["value"]))
             if "quantity" in fields:
                 quantities.add_metric([*labels, key.what, str(fields["unit"])], float(fields["quantity"]))
             if key.what == "position":
                 times.add_metric(labels, time.timestamp())
-        yield from (up, *found.values(), states, quantities, times)
+        yield from (up, *metrics.values(), states, quantities, times)

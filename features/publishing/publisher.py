@@ -14,38 +14,38 @@ from collections.abc import Callable, Sequence
 
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.base.text import counted
-from multidrop.features.publishing.broker import Connection, Message
+from multidrop.features.publishing.broker import BrokerConnection, BrokerMessage
 from multidrop.shell.connect import Pauses
 
-MOST = 10_000
+MOST_QUEUED_MESSAGES = 10_000
 """Messages that wait at most; some 5 MB."""
 
 
 class Backlog:
     """A bounded queue that also keeps the last message of each retained topic."""
 
-    def __init__(self, most: int = MOST) -> None:
-        self._waiting: deque[Message] = deque()
+    def __init__(self, most: int = MOST_QUEUED_MESSAGES) -> None:
+        self._waiting: deque[BrokerMessage] = deque()
         self._most = most
-        self._retained: dict[str, Message] = {}
+        self._retained: dict[str, BrokerMessage] = {}
         self._dropped: Counter[str] = Counter()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def put(self, message: Message) -> None:
+    def put(self, message: BrokerMessage) -> None:
         if message.retain:
             self._retained[message.topic] = message
         self._waiting.append(message)
         self._bound()
 
-    def first(self) -> Message | None:
+    def first(self) -> BrokerMessage | None:
         return self._waiting[0] if self._waiting else None
 
     def sent(self) -> None:
         self._waiting.popleft()
 
-    def give_back(self, messages: Sequence[Message]) -> None:
+    def give_back(self, messages: Sequence[BrokerMessage]) -> None:
         self._waiting.extendleft(reversed(messages))
         self._bound()
 
@@ -62,33 +62,33 @@ class Backlog:
 
     def take_dropped(self) -> Counter[str]:
         """Return the numbers of messages that were dropped, by bus, and count from 0."""
-        found, self._dropped = self._dropped, Counter()
-        return found
+        dropped, self._dropped = self._dropped, Counter()
+        return dropped
 
     def _bound(self) -> None:
         while len(self._waiting) > self._most:
             self._dropped[self._waiting.popleft().bus] += 1
 
 
-FIRST, LONGEST = 1.0, 30.0
+FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
 """The pause before the first attempt to connect again, s; each further one is twice as long, up to the longest."""
 DRAIN = 2.0
 """The longest time for the last messages at the end, s."""
-LOOK = 0.02
+LOOK_PERIOD = 0.02
 REMIND = 60.0
 """The time between two reports of what is dropped while it goes on, s."""
 
 
-async def connected(make: Callable[[], Connection]) -> Connection:
+async def connected(make: Callable[[], BrokerConnection]) -> BrokerConnection:
     """Make a connection, and connect. Raises TransportLost or Diagnostic."""
     connection = make()
     await connection.connect()
     return connection
 
 
-async def again(make: Callable[[], Connection], notify: Callable[[str], None]) -> Connection:
+async def again(make: Callable[[], BrokerConnection], notify: Callable[[str], None]) -> BrokerConnection:
     """Try until there is a connection; say each reason once."""
-    pauses, said = Pauses(FIRST, LONGEST), ""
+    pauses, said = Pauses(FIRST_PAUSE, LONGEST_PAUSE), ""
     while True:
         await asyncio.sleep(pauses.now)
         pauses.lengthen()
@@ -107,13 +107,13 @@ async def over(task: asyncio.Task[None]) -> None:
         await asyncio.wait([task], timeout=1)
 
 
-class Publisher:
+class MessagePublisher:
     """Messages on their way to a broker. `begin` connects, `end` says goodbye."""
 
     def __init__(
         self,
-        make: Callable[[], Connection],
-        online: Message,
+        make: Callable[[], BrokerConnection],
+        online: BrokerMessage,
         notify: Callable[[str], None],
         dropped: Callable[[Counter[str]], None],
         backlog: Backlog | None = None,
@@ -124,7 +124,7 @@ class Publisher:
         """
         self._make, self._online, self._notify, self._dropped = make, online, notify, dropped
         self._backlog = Backlog() if backlog is None else backlog
-        self._connection: Connection | None = None
+        self._connection: BrokerConnection | None = None
         """None while the broker is away."""
         self._task: asyncio.Task[None] | None = None
         self._said_dropped = float("-inf")
@@ -139,7 +139,7 @@ class Publisher:
         self._begun(connection)
         self._task = asyncio.get_running_loop().create_task(self._keep(connection))
 
-    def put(self, message: Message) -> None:
+    def put(self, message: BrokerMessage) -> None:
         self._backlog.put(message)
         self.pump()
 
@@ -170,14 +170,14 @@ class Publisher:
         self._notify(f"{lost} dropped, the oldest of those that waited")
         self._dropped(dropped)
 
-    async def end(self, goodbye: Message) -> None:
+    async def end(self, goodbye: BrokerMessage) -> None:
         """Send what waits, and the goodbye, within a limit; then disconnect."""
         self._backlog.put(goodbye)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(DRAIN):
                 while self._connection is not None and (len(self._backlog) or self._connection.in_flight()):
                     self.pump()
-                    await asyncio.sleep(LOOK)
+                    await asyncio.sleep(LOOK_PERIOD)
         if self._task is not None:
             await over(self._task)
         if self._connection is not None:
@@ -192,7 +192,7 @@ class Publisher:
     def waiting(self) -> int:
         return len(self._backlog)
 
-    def _begun(self, connection: Connection) -> None:
+    def _begun(self, connection: BrokerConnection) -> None:
         connection.on_room = self.pump
         self.sent += connection.publish(self._online)
         self._backlog.renew()
@@ -207,7 +207,7 @@ class Publisher:
             self.sent -= len(unsent)
             self._backlog.give_back(unsent)
 
-    async def _keep(self, connection: Connection) -> None:
+    async def _keep(self, connection: BrokerConnection) -> None:
         """Connect again after each loss, until cancelled."""
         while True:
             await connection.lost.wait()

@@ -31,7 +31,7 @@ Fields = Mapping[str, int | float | str]
 """`value`, and more facts."""
 
 
-class Key(NamedTuple):
+class ValueKey(NamedTuple):
     """`position`, `velocity`, `state` or `error` of an axis of a drive.
 
     A drive whose axes have names has a state and an error of each, and its own, which have none.
@@ -43,7 +43,7 @@ class Key(NamedTuple):
     axis: str = ""
 
 
-class Value(NamedTuple):
+class PublishedValue(NamedTuple):
     """A value, and when its drive was asked: by the clock of the session, and as the time of day."""
 
     at: float
@@ -70,7 +70,7 @@ class Outlet:
     def line(self, bus: str, word: str) -> None:
         """Take the new state of a line."""
 
-    def value(self, key: Key, value: Value) -> None:
+    def value(self, key: ValueKey, value: PublishedValue) -> None:
         """Take a new value."""
 
     async def end(self) -> str:
@@ -80,17 +80,17 @@ class Outlet:
 
 def error_of(conditions: Iterable[Conditions]) -> Fields:
     """A drive's error: that of the first axis that has one; 0: none."""
-    found = next((each for each in conditions if each.error), None)
-    if found is None:
+    failing = next((condition for condition in conditions if condition.error), None)
+    if failing is None:
         return {"value": 0, "text": ""}
-    unread = found.cause or "set; to read its number would clear it"
-    text = unread if found.error == UNREAD else found.error_text
-    return {"value": found.error, "text": text, "axis": found.axis}
+    unread = failing.cause or "set; to read its number would clear it"
+    text = unread if failing.error == UNREAD else failing.error_text
+    return {"value": failing.error, "text": text, "axis": failing.axis}
 
 
 DEFAULT = "2"
 """The usual rate, samples a second of each drive."""
-SLOWEST, FASTEST = 0.01, 50.0
+SLOWEST_RATE, FASTEST_RATE = 0.01, 50.0
 CONDITIONS = 1.0
 """Seconds between two readings of conditions on a line, of one drive after the other."""
 
@@ -98,8 +98,8 @@ CONDITIONS = 1.0
 def parse_rate(text: str) -> float:
     """The period between two samples of a drive, s. Raises Diagnostic."""
     rate = real(text) or 0.0
-    if not SLOWEST <= rate <= FASTEST:
-        valid = f"valid: {SLOWEST:g} to {FASTEST:g} samples a second of each drive"
+    if not SLOWEST_RATE <= rate <= FASTEST_RATE:
+        valid = f"valid: {SLOWEST_RATE:g} to {FASTEST_RATE:g} samples a second of each drive"
         raise Diagnostic(f"invalid rate {text!r}", "--rate", valid)
     return 1 / rate
 
@@ -146,14 +146,14 @@ class DriveValues:
         elif isinstance(event, Silent):
             self._say_state(event.at, SILENT)
         else:
-            self._program = next((each.program for each in event.conditions if each.program), "")
-            self._no_current = {each.axis: bool(each.no_current) for each in event.conditions}
+            self._program = next((condition.program for condition in event.conditions if condition.program), "")
+            self._no_current = {condition.axis: bool(condition.no_current) for condition in event.conditions}
             if known := self._said.get(("state", "")):
                 self._say_state(event.at, str(known["value"]) if known["value"] in (SILENT, LOST) else "")
             self._say("error", "", event.at, error_of(event.conditions))
-            for each in event.conditions:
-                if each.axis:
-                    self._say("error", each.axis, event.at, error_of([each]))
+            for condition in event.conditions:
+                if condition.axis:
+                    self._say("error", condition.axis, event.at, error_of([condition]))
 
     def lost(self, at: float) -> None:
         self._program = None
@@ -203,11 +203,11 @@ class Registry:
         """`period`: between two samples of a drive, s."""
         self.session, self.period = session, period
         self.outlets: list[Outlet] = []
-        self.values: dict[Key, Value] = {}
+        self.values: dict[ValueKey, PublishedValue] = {}
         """The last value of each key."""
         self.words: dict[str, str] = {}
         """The state of each line: ONLINE or LOST."""
-        self._lines: dict[str, _Line] = {}
+        self._lines: dict[str, _PublishedLine] = {}
         self._leave: Callable[[], None] = lambda: None
         self._time: tuple[float, datetime] | None = None
         """The time of the last value on both clocks: all values of one sample have the same time."""
@@ -218,7 +218,7 @@ class Registry:
             self.add(bus)
 
     def add(self, bus: Bus) -> None:
-        self._lines[bus.name] = _Line(self, bus)
+        self._lines[bus.name] = _PublishedLine(self, bus)
 
     def end(self) -> None:
         self._leave()
@@ -237,19 +237,19 @@ class Registry:
         for outlet in self.outlets:
             outlet.line(bus, word)
 
-    def current(self, key: Key) -> bool:
+    def current(self, key: ValueKey) -> bool:
         """Whether the drive of a value replies, as far as is known."""
-        state = self.values.get(Key(key.bus, key.address, "state"))
+        state = self.values.get(ValueKey(key.bus, key.address, "state"))
         return state is None or state.number not in (SILENT, LOST)
 
     def _in_units(self, bus: str, address: str, axis: str, number: float, takes: Takes) -> tuple[float, str] | None:
-        found = self.session.buses[bus].drives.get(address) if self.session.scaled else None
-        return None if found is None else self.session.units.given(found, axis, number, takes)
+        drive = self.session.buses[bus].drives.get(address) if self.session.scaled else None
+        return None if drive is None else self.session.units.given(drive, axis, number, takes)
 
     def _put(self, bus: str, address: str, what: str, axis: str, at: float, fields: Fields) -> None:
         if self._time is None or self._time[0] != at:
             self._time = (at, self.session.wall(at))
-        key, value = Key(bus, address, what, axis), Value(*self._time, fields)
+        key, value = ValueKey(bus, address, what, axis), PublishedValue(*self._time, fields)
         self.values[key] = value
         for outlet in self.outlets:
             outlet.value(key, value)
@@ -259,7 +259,7 @@ class Registry:
             line.take(event.event)
 
 
-class _Line:
+class _PublishedLine:
     """One line: its state, and its drives, which are polled."""
 
     def __init__(self, registry: Registry, bus: Bus) -> None:
@@ -300,7 +300,7 @@ class _Line:
         for gone in self._drives.keys() - set(addresses):  # its state must not stay
             self._drives[gone].lost(self._bus.now())
         self._drives = {
-            each: self._drives.get(each) or self._registry.drive(self._bus.name, each) for each in addresses
+            address: self._drives.get(address) or self._registry.drive(self._bus.name, address) for address in addresses
         }
         telemetry = self._bus.telemetry
         self._ends.append(telemetry.subscribe(addresses, self._registry.period).close)

@@ -19,9 +19,9 @@ from textual.binding import Binding, BindingType
 
 from multidrop import tui
 from multidrop.features.publishing.broker import load, parse_target
-from multidrop.features.publishing.plant import ENDED, ERROR, UNKNOWN, URGENCY, Place, Row, shown
+from multidrop.features.publishing.plant import ENDED, ERROR, UNKNOWN, URGENCY, PlantRow, TopicPlace, shown
 from multidrop.features.publishing.registry import AT_REST, MOVING
-from multidrop.features.publishing.watch import DRAIN, Watch, begun, summary
+from multidrop.features.publishing.watch import DRAIN, PlantWatch, begun, summary
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES
@@ -61,13 +61,13 @@ class PlantApp(Dressed):
         *(Binding(key, f"step({by})") for key, by in (("home", -(10**9)), ("end", 10**9))),
     ]
 
-    broker: Watch
+    broker: PlantWatch
 
     def __init__(self, url: str, settings: Settings) -> None:
         super().__init__(settings.look)
         self.target, self._settings = parse_target(url, "plant"), settings
-        self._rows: list[Row] = []
-        self._chosen: Place | None = None
+        self._rows: list[PlantRow] = []
+        self._chosen: TopicPlace | None = None
         self._words = self._told = ""
         self._is_composed = False
         self.boundary = Boundary(settings.state, self.tell, "everything else goes on")
@@ -83,7 +83,7 @@ class PlantApp(Dressed):
 
     async def watch_broker(self, over: asyncio.Event) -> bool:
         """Connect; return whether that was done before `over`. Raises TransportLost or Diagnostic."""
-        self.broker = Watch(self.target, self._settings, self.tell)
+        self.broker = PlantWatch(self.target, self._settings, self.tell)
         return await begun(self.broker, over)
 
     async def end(self) -> None:
@@ -156,9 +156,9 @@ class PlantApp(Dressed):
     def on_click(self, event: events.Click) -> None:
         rows = self.query_one("#drives", Lines)
         if event.widget is rows and self.broker.plant.followed is None:
-            found = in_view(self._rows, self._at(), rows.size.height)
-            if event.y < len(found):
-                self._chosen = found[event.y][1].place
+            visible = in_view(self._rows, self._at(), rows.size.height)
+            if event.y < len(visible):
+                self._chosen = visible[event.y][1].place
                 self.paint()
 
     # Pictures
@@ -167,7 +167,7 @@ class PlantApp(Dressed):
         places = [row.place for row in self._rows]
         return places.index(self._chosen) if self._chosen in places else 0
 
-    def _row(self) -> Row | None:
+    def _row(self) -> PlantRow | None:
         return self._rows[self._at()] if self._rows else None
 
     def paint(self) -> None:
@@ -209,7 +209,7 @@ class PlantApp(Dressed):
         parts["columns"].put([head])
         body.put(rows[: body.size.height])
 
-    def _drive(self, place: Place) -> tuple[Shown, list[Shown]]:
+    def _drive(self, place: TopicPlace) -> tuple[Shown, list[Shown]]:
         """The values of the followed drive with their ages, and its samples, the newest first."""
         now, plant = self.broker.now, self.broker.plant
         row = next((each for each in self.broker.rows() if each.place == place), None)
@@ -237,11 +237,11 @@ class PlantApp(Dressed):
         return head, rows
 
 
-def _text(row: Row) -> str:
+def _text(row: PlantRow) -> str:
     return f"{row.where} {row.line}:{row.drive} {row.state} {row.error}".casefold()
 
 
-def _role(row: Row) -> str:
+def _role(row: PlantRow) -> str:
     if row.error or row.state not in CALM:
         return "error"
     return "motion" if row.state == MOVING else "dim" if row.state in (UNKNOWN, ENDED) else "text"
@@ -258,7 +258,7 @@ def _columns(width: int) -> Shown:
     return ((fit(f"{names}  {'velocity, error' if width >= 100 else 'error'}", width), "dim"),)
 
 
-def _drive_row(row: Row, width: int, chosen: bool) -> Shown:
+def _drive_row(row: PlantRow, width: int, chosen: bool) -> Shown:
     name = ":".join(filter(None, (row.line, row.drive))) if row.place.line else "no drive"
     old = "dim" if row.age is None else "text"
     error = row.error or (row.numbers["velocity"] if width >= 100 else "")

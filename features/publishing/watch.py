@@ -10,8 +10,8 @@ from collections.abc import Callable
 from datetime import datetime
 
 from multidrop.base.text import counted
-from multidrop.features.publishing.broker import Connection, Target, fresh_name, load, parse_target
-from multidrop.features.publishing.plant import LONGEST, TOPIC, Plant, Row
+from multidrop.features.publishing.broker import BrokerConnection, Target, fresh_name, load, parse_target
+from multidrop.features.publishing.plant import LONGEST_PAYLOAD, LONGEST_TOPIC, Plant, PlantRow
 from multidrop.features.publishing.publisher import again, connected, over
 from multidrop.shell import configuration
 from multidrop.shell.configuration import Settings
@@ -31,7 +31,7 @@ PRINT = 1.0
 """Seconds between two looks for rows that have changed."""
 
 
-class Watch:
+class PlantWatch:
     """A plant, and its broker, which is tried again when it is lost. `begin`, then `drain` every DRAIN seconds."""
 
     def __init__(self, target: Target, settings: Settings, notify: Callable[[str], None]) -> None:
@@ -42,7 +42,7 @@ class Watch:
         self.left = ""
         """Why the broker was left for good; empty: it was not."""
         self._notify = notify
-        self._make = lambda: Connection(target, settings.section("mqtt"), None, fresh_name(), self._take)
+        self._make = lambda: BrokerConnection(target, settings.section("mqtt"), None, fresh_name(), self._take)
         self._waiting: deque[tuple[str, bytes, bool, float]] = deque(maxlen=INBOX)
         self._dropped = 0
         self._task: asyncio.Task[None] | None = None
@@ -58,7 +58,7 @@ class Watch:
     def _take(self, topic: str, payload: bytes, retained: bool) -> None:
         """Queue a message, in the thread of the connection."""
         self._dropped += len(self._waiting) == INBOX
-        self._waiting.append((topic[: TOPIC + 1], payload[: LONGEST + 1], retained, self.now))
+        self._waiting.append((topic[: LONGEST_TOPIC + 1], payload[: LONGEST_PAYLOAD + 1], retained, self.now))
 
     @property
     def now(self) -> float:
@@ -73,10 +73,10 @@ class Watch:
             self.plant.ignored["dropped: they came too fast"] += self._dropped
             self._dropped = 0
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[PlantRow]:
         return self.plant.rows(self.now)
 
-    async def _keep(self, connection: Connection) -> None:
+    async def _keep(self, connection: BrokerConnection) -> None:
         try:
             while True:
                 await connection.lost.wait()
@@ -95,9 +95,9 @@ class Watch:
             await connection.close()
 
 
-def summary(plant: Plant, rows: list[Row]) -> str:
+def summary(plant: Plant, rows: list[PlantRow]) -> str:
     """`50 PCs, 1 without about · 500 drives`, and the messages that were not read."""
-    bare = sum(not each.host for each in plant.publishers.values())
+    bare = sum(not publisher.host for publisher in plant.publishers.values())
     parts = [counted(len(plant.publishers), "PC") + (f", {bare} without about" if bare else "")]
     parts += [counted(sum(bool(row.place.line) for row in rows), "drive")]
     return " · ".join([*parts, *(f"{counted(number, 'message')} {why}" for why, number in plant.ignored.items())])
@@ -114,7 +114,7 @@ async def _run(url: str, as_json: bool) -> int:
         try:
             target = parse_target(url, "plant")
             load("plant")
-            watch = Watch(target, configuration.load(), lambda text: write(sys.stderr, text))
+            watch = PlantWatch(target, configuration.load(), lambda text: write(sys.stderr, text))
             try:
                 if await begun(watch, over):
                     await _print(watch, as_json, over)
@@ -127,7 +127,7 @@ async def _run(url: str, as_json: bool) -> int:
             await finish(streams, over.is_set)
 
 
-async def begun(watch: Watch, over: asyncio.Event) -> bool:
+async def begun(watch: PlantWatch, over: asyncio.Event) -> bool:
     """Connect; return whether that was done before a signal. Raises TransportLost or Diagnostic."""
     begin, signal = asyncio.create_task(watch.begin()), asyncio.create_task(over.wait())
     await asyncio.wait((begin, signal), return_when=asyncio.FIRST_COMPLETED)
@@ -139,9 +139,9 @@ async def begun(watch: Watch, over: asyncio.Event) -> bool:
     return True
 
 
-async def _print(watch: Watch, as_json: bool, over: asyncio.Event) -> None:
+async def _print(watch: PlantWatch, as_json: bool, over: asyncio.Event) -> None:
     """Print rows as they change, until a signal, or until the broker is left."""
-    loop, shown, said = asyncio.get_running_loop(), dict[object, Row](), ""
+    loop, shown, said = asyncio.get_running_loop(), dict[object, PlantRow](), ""
     due = loop.time() + PRINT
     while not (over.is_set() or watch.left):
         await asyncio.sleep(DRAIN)
@@ -160,24 +160,24 @@ async def _print(watch: Watch, as_json: bool, over: asyncio.Event) -> None:
             write(sys.stderr, text)
 
 
-def _line(row: Row) -> str:
+def _line(row: PlantRow) -> str:
     time = datetime.now().strftime("%H:%M:%S")
     name = ":".join(filter(None, (row.line, row.drive)))
     return f"{time}  {row.where}  {name or '(no drive)'}  {row.state}  {row.numbers['position']}  {row.error}".rstrip()
 
 
-def _object(plant: Plant, row: Row) -> str:
+def _object(plant: Plant, row: PlantRow) -> str:
     """A row as an object for programs, with the age of each value; null: unknown."""
     now, publisher = asyncio.get_running_loop().time(), plant.publishers[row.place.publisher]
     values: list[dict[str, object]] = [
-        {"what": what, "axis": axis, "value": each.value, "text": each.text}
-        | {"age": None if each.at is None else round(now - each.at, 1)}
-        for (what, axis), each in plant.drives.get(row.place, {}).items()
+        {"what": what, "axis": axis, "value": value.value, "text": value.text}
+        | {"age": None if value.at is None else round(now - value.at, 1)}
+        for (what, axis), value in plant.drives.get(row.place, {}).items()
     ]
-    found = {"time": datetime.now().astimezone().isoformat(timespec="milliseconds"), "place": row.where}
+    message = {"time": datetime.now().astimezone().isoformat(timespec="milliseconds"), "place": row.where}
     more = {
         "publisher": row.place.publisher,
         "host": publisher.host,
         "program": plant.program(row.place.publisher, now),
     }
-    return json.dumps(found | more | {"line": row.line, "drive": row.drive, "state": row.state, "values": values})
+    return json.dumps(message | more | {"line": row.line, "drive": row.drive, "state": row.state, "values": values})

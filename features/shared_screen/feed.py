@@ -16,16 +16,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from multidrop.drives.events import Conditioned, Sample, Silent, Valued
-from multidrop.features.shared_screen.wire import Dropped, Heard, Item, Now, line
+from multidrop.features.shared_screen.wire import Dropped, Item, Now, StopHeard, line
 from multidrop.shell import events
 from multidrop.shell.roles import Series
-from multidrop.shell.stop_report import Found
+from multidrop.shell.stop_report import DriveFate
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.figures import Figures
 from multidrop.tui.screen_model import Record
 
 if sys.platform != "win32":
-    from multidrop.features.shared_screen.host import Calls, Gate, Watcher
+    from multidrop.features.shared_screen.host import Gate, GateCalls, Watcher
 
 assert sys.platform != "win32"
 
@@ -33,13 +33,13 @@ BEAT = 0.05
 """Seconds between two lines to the watchers."""
 LOOKS = 5
 """Beats between two looks at the state."""
-SIGNS = 20
+BEATS_A_SIGN = 20
 """Beats between two signs of life."""
 HISTORY = 2000
 """Records of each transcript for a watcher that comes."""
 SAMPLES = 1000
 """Samples of each axis for his plots."""
-AT_ONCE = 250
+ITEMS_A_MESSAGE = 250
 """Items of a line to him."""
 SERIES = (Sample, Valued, events.Predicted)
 """Values of which a plot shows many."""
@@ -98,7 +98,7 @@ class Shared(NamedTuple):
     stops: int = -1
     stopped_at: float = 0.0
     latched: bool = False
-    found: tuple[Found, ...] = ()
+    found: tuple[DriveFate, ...] = ()
     vain: bool = False
     selected: tuple[str, str] = ("", "")
     recording: str = ""
@@ -110,7 +110,7 @@ class Shared(NamedTuple):
     watchers: tuple[str, ...] = ()
 
 
-TYPES = (Shared, Record, Now, Heard, Dropped, *VALUES)
+TYPES = (Shared, Record, Now, StopHeard, Dropped, *VALUES)
 """The values on the wire."""
 
 
@@ -121,22 +121,22 @@ def shared(app: MultidropApp, watchers: Sequence[str]) -> Shared:
     for bus in session.tabs.shown:
         drives = tuple(
             SharedDrive(
-                each.address,
-                each.label,
-                each.family.name,
-                each.product,
-                each.version,
-                each.programming,
-                tuple(sorted(each.state.unreferenced)),
-                each.state.stranger,
+                drive.address,
+                drive.label,
+                drive.family.name,
+                drive.product,
+                drive.version,
+                drive.programming,
+                tuple(sorted(drive.state.unreferenced)),
+                drive.state.stranger,
             )
-            for each in bus.drives.values()
+            for drive in bus.drives.values()
         )
         buses.append(SharedBus(id(bus), bus.name, bus.link.transport.name, presenter.loss(bus), drives))
         for address in bus.drives:
-            found = app.model.bus(bus.name).readout(address)
-            figures = tuple((axis.axis, axis.figures) for axis in found.axes)
-            readouts.append(SharedReadout(bus.name, address, found.period, found.watched, figures))
+            readout = app.model.bus(bus.name).readout(address)
+            figures = tuple((axis.axis, axis.figures) for axis in readout.axes)
+            readouts.append(SharedReadout(bus.name, address, readout.period, readout.watched, figures))
     tally = session.tally() if session.latched else None
     return Shared(
         session.stops,
@@ -147,7 +147,7 @@ def shared(app: MultidropApp, watchers: Sequence[str]) -> Shared:
         (session.place.bus, session.place.address),
         session.recording,
         str(session.log.path) if session.log is not None else "",
-        tuple(SharedMacro(each.name, each.key, each.step, each.steps) for each in session.playing),
+        tuple(SharedMacro(playing.name, playing.key, playing.step, playing.steps) for playing in session.playing),
         tuple(session.plotted),
         tuple(buses),
         tuple(readouts),
@@ -163,13 +163,13 @@ def note(watchers: Sequence[str], width: int) -> str:
     return f"watched by {who[:24]}"
 
 
-class Feed:
+class ScreenFeed:
     """Feeds the watchers of one app, and stops for them. Raises Diagnostic where the screen cannot be shared."""
 
     def __init__(self, app: MultidropApp, folder: Path) -> None:
         self._app, self._loop = app, asyncio.get_running_loop()
         refused = partial(app.session.notify, warning=True)
-        calls = Calls(app.stop_ahead, self._stop, self._joined, self._catch_up, self._left, refused)
+        calls = GateCalls(app.stop_ahead, self._stop, self._joined, self._catch_up, self._left, refused)
         self.gate = Gate(folder, self._loop, calls)
         self._pending: list[Item] = []
         self._last: dict[tuple[str, ...], deque[Item]] = {}
@@ -187,7 +187,7 @@ class Feed:
     @property
     def watchers(self) -> list[str]:
         """The names of those that watch."""
-        return [each.name for each in self.gate.watchers]
+        return [watcher.name for watcher in self.gate.watchers]
 
     def close(self) -> None:
         self._unsubscribe()
@@ -216,17 +216,19 @@ class Feed:
 
     def _records(self, bus: str, records: Sequence[Record]) -> None:
         """Take new records; those of the page of no bus come again once that becomes the page of the first bus."""
-        news = [each for each in records if not (each.private or any(each is other for other in self._of_no_bus))]
+        news = [
+            record for record in records if not (record.private or any(record is other for other in self._of_no_bus))
+        ]
         self._of_no_bus = [] if bus else [*self._of_no_bus, *news]
         if self.gate.watchers:
-            self._pending += [Item(each, bus) for each in news]
+            self._pending += [Item(record, bus) for record in news]
 
     # To the watchers
 
     def _beat(self) -> None:
         self._timer = self._loop.call_later(BEAT, self._beat) if self.gate.watchers else None
         self._beats += 1
-        if self._beats % SIGNS == 0:
+        if self._beats % BEATS_A_SIGN == 0:
             self._pending.append(Item(Now(self._app.session.now())))
         if self._changed or self._beats % LOOKS == 0:
             self._changed = False
@@ -238,8 +240,8 @@ class Feed:
     def _flush(self) -> None:
         items, self._pending = self._pending, []
         data = line(items) if items and self.gate.watchers else b""
-        for each in self.gate.watchers if data else ():
-            each.put(data, len(items))
+        for watcher in self.gate.watchers if data else ():
+            watcher.put(data, len(items))
 
     def _catch_up(self, watcher: Watcher, most: int = 1) -> None:
         """Send the state and the last values, as many of each as `most`."""
@@ -275,15 +277,15 @@ class Feed:
 
 
 def _put(watcher: Watcher, items: Sequence[Item]) -> None:
-    for begin in range(0, len(items), AT_ONCE):
-        part = items[begin : begin + AT_ONCE]
+    for begin in range(0, len(items), ITEMS_A_MESSAGE):
+        part = items[begin : begin + ITEMS_A_MESSAGE]
         watcher.put(line(part), len(part), keep=True)
 
 
 @contextmanager
-def sharing(app: MultidropApp, folder: Path) -> Iterator[Feed]:
+def sharing(app: MultidropApp, folder: Path) -> Iterator[ScreenFeed]:
     """Share an app's screen with watchers of the same account. Raises Diagnostic where that cannot be."""
-    feed = Feed(app, folder)
+    feed = ScreenFeed(app, folder)
     app.session.notify("this screen is shared: `multidrop tui --join` watches it; elsewhere, --join ssh://THIS-HOST")
     try:
         yield feed

@@ -28,20 +28,20 @@ from multidrop.shell.threads import BoundedWriter, Loss
 
 assert sys.platform != "win32"
 
-MOST = 16
+MOST_WATCHERS = 16
 """Watchers at one time, and connections that have not greeted yet."""
 BACKLOG = 128
 """Connections that may come at once, before the thread that takes them comes to run."""
 WAITING = 512 * 1024
 """The bytes that may wait for a watcher."""
-PATIENCE = 5.0
+HELLO_TIMEOUT = 5.0
 """Seconds for a greeting."""
-PAUSE = 0.05
+WATCHER_STOP_PAUSE = 0.05
 """Seconds between two stops of a watcher: a flood of them does not keep the host from its work."""
 
 
 @dataclass(frozen=True)
-class Calls:
+class GateCalls:
     """The functions that a gate calls: `stop_ahead` in the thread of a watcher, the others in the loop."""
 
     stop_ahead: Callable[[], None]
@@ -59,7 +59,11 @@ class Watcher:
     """The connection of one watcher."""
 
     def __init__(
-        self, made: socket.socket, loop: asyncio.AbstractEventLoop, calls: Calls, admitted: Callable[[Watcher], bool]
+        self,
+        made: socket.socket,
+        loop: asyncio.AbstractEventLoop,
+        calls: GateCalls,
+        admitted: Callable[[Watcher], bool],
     ) -> None:
         """`admitted`, called in its thread once it has greeted, takes a place for it, if there is one."""
         self.name = ""
@@ -88,7 +92,7 @@ class Watcher:
                 if self._greeted():
                     self._call(self._calls.joined, self)
                     self._take_stops()
-            except (OSError, wire.Garbled):
+            except (OSError, wire.GarbledMessage):
                 pass  # hung up, or no watcher
             finally:
                 self.close()
@@ -98,9 +102,9 @@ class Watcher:
         if peer(self._socket) != os.getuid():
             self.turn_away("it is of another account")
             return False
-        self._socket.settimeout(PATIENCE)
+        self._socket.settimeout(HELLO_TIMEOUT)
         self._socket.sendall(wire.greeting())
-        said, until = b"", time.monotonic() + PATIENCE
+        said, until = b"", time.monotonic() + HELLO_TIMEOUT
         while not said.endswith(b"\n"):
             data = self._socket.recv(1)  # no byte of what follows
             if not data or len(said) > wire.LONGEST_GREETING or time.monotonic() > until:
@@ -111,7 +115,7 @@ class Watcher:
             self.turn_away(wrong)
             return False
         if not self._admitted(self):
-            self.turn_away(f"more than {MOST} watchers at a time")
+            self.turn_away(f"more than {MOST_WATCHERS} watchers at a time")
             return False
         self._socket.settimeout(None)
         return True
@@ -122,8 +126,8 @@ class Watcher:
                 self._calls.stop_ahead()
             self._stops += len(data)
             self._call(self._calls.stop, self.name)
-            self._writer.put(wire.line([wire.Item(wire.Heard(self._stops))]), keep=True)
-            time.sleep(PAUSE)
+            self._writer.put(wire.line([wire.Item(wire.StopHeard(self._stops))]), keep=True)
+            time.sleep(WATCHER_STOP_PAUSE)
 
     def _lost(self, loss: Loss) -> bytes:
         self._call(self._calls.behind, self)
@@ -137,7 +141,7 @@ class Watcher:
 class Gate:
     """The socket to which watchers connect; it is named by the process. Raises Diagnostic where there can be none."""
 
-    def __init__(self, folder: Path, loop: asyncio.AbstractEventLoop, calls: Calls) -> None:
+    def __init__(self, folder: Path, loop: asyncio.AbstractEventLoop, calls: GateCalls) -> None:
         self.path = folder / f"{os.getpid()}.sock"
         self.watchers: list[Watcher] = []
         """Those that have greeted; changed in the loop."""
@@ -164,12 +168,12 @@ class Gate:
             try:
                 made, _ = self._socket.accept()
             except OSError:
-                time.sleep(PAUSE)  # the end, or no descriptor is left
+                time.sleep(WATCHER_STOP_PAUSE)  # the end, or no descriptor is left
                 continue
             watcher = Watcher(made, self._loop, self._calls, self._admit)
             with self._lock:
                 self._waiting.append(watcher)
-                oldest = self._waiting.pop(0) if len(self._waiting) > MOST else None
+                oldest = self._waiting.pop(0) if len(self._waiting) > MOST_WATCHERS else None
             if oldest is not None:  # it would keep out one that greets
                 oldest.close()
             threading.Thread(target=self._serve, args=(watcher,), name="watcher", daemon=True).start()
@@ -178,7 +182,7 @@ class Gate:
         """Give a place to a watcher that has greeted; False where all are taken."""
         with self._lock:
             self._forget(watcher)
-            there = len(self._admitted) < MOST
+            there = len(self._admitted) < MOST_WATCHERS
             if there:
                 self._admitted.add(watcher)
             return there
@@ -203,15 +207,15 @@ class Gate:
         self._socket.close()
         with self._lock:
             waiting = [*self._waiting]
-        for each in (*self.watchers, *waiting):
-            each.close()
+        for watcher in (*self.watchers, *waiting):
+            watcher.close()
 
 
 def private(folder: Path) -> None:
     """Make a folder that only this account can enter. Raises OSError where that cannot be."""
     make_folder(folder, 0o700)
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid():
+    facts = folder.lstat()
+    if not stat.S_ISDIR(facts.st_mode) or facts.st_uid != os.getuid():
         raise OSError(0, "the folder is another account's")
     folder.chmod(0o700)
 

@@ -27,7 +27,7 @@ assert sys.platform != "win32"
 SCREEN = "screen:"
 """The port of `multidrop relay` that is a shared screen; a number may follow."""
 _FAR = re.compile(rf"ssh://(?:({WORD})@)?({WORD}|\[[0-9A-Fa-f:.]+\])(?::([0-9]{{1,5}}))?(?:/([0-9]*))?")
-_READ = 64 * 1024
+_READ_BYTES = 64 * 1024
 
 
 def joined(where: str, folder: Path) -> tuple[SocketStream, str, bytes]:
@@ -44,12 +44,12 @@ def joined(where: str, folder: Path) -> tuple[SocketStream, str, bytes]:
 
 
 def _far(where: str) -> FarPort:
-    if (found := _FAR.fullmatch(where)) is None:
+    if (match := _FAR.fullmatch(where)) is None:
         from multidrop.shell.secrets import url_without_secrets
 
         hint = "as in --join ssh://HOST, or --join ssh://USER@HOST:22/NUMBER"
         raise Diagnostic("is no screen to join", url_without_secrets(where), hint)
-    user, host, port, number = found.groups("")
+    user, host, port, number = match.groups("")
     return FarPort(host.strip("[]"), SCREEN + number, user, int(port or 0))
 
 
@@ -57,20 +57,20 @@ def _greet(connection: SocketStream, there: str, far: FarPort | None) -> tuple[s
     """Greet; return who shares the screen, and what came after his greeting. A far shell may say something before."""
     held, until = b"", time.monotonic() + OPENING
     try:
-        while (left := until - time.monotonic()) > 0 and len(held) < _READ:
+        while (left := until - time.monotonic()) > 0 and len(held) < _READ_BYTES:
             if not select.select([connection.fileno()], [], [], left)[0]:
                 continue
             if not (data := connection.read(wire.LONGEST_GREETING)):
                 break
             *lines, rest = (held := held + data).split(b"\n")
-            for number, each in enumerate(lines):
-                if each.startswith(wire.WORD.encode()):
-                    version, name = wire.greeted(each)
+            for number, line in enumerate(lines):
+                if line.startswith(wire.WORD.encode()):
+                    version, name = wire.greeted(line)
                     if wrong := wire.other_version(version, there):
                         raise Unreachable(f"{there}: {wrong}")
                     connection.write(wire.greeting())
                     return name, b"\n".join([*lines[number + 1 :], rest])
-    except (OSError, wire.Garbled) as problem:
+    except (OSError, wire.GarbledMessage) as problem:
         held = held or str(problem).encode()
     except Unreachable:
         connection.close(True)
@@ -84,7 +84,7 @@ def _greet(connection: SocketStream, there: str, far: FarPort | None) -> tuple[s
 
 def connect(number: str, folder: Path) -> socket.socket:
     """Connect to a screen that this account shares on this machine. Raises Diagnostic, Unreachable."""
-    found: dict[str, socket.socket] = {}
+    sockets: dict[str, socket.socket] = {}
     since: list[str] = []
     for path in sorted(folder.glob("*.sock")):
         made = socket.socket(socket.AF_UNIX)
@@ -93,14 +93,14 @@ def connect(number: str, folder: Path) -> socket.socket:
             if peer(made) != os.getuid():
                 raise OSError(0, "of another account")
             since.append(f"{path.stem} since {time.strftime('%H:%M:%S', time.localtime(path.stat().st_mtime))}")
-            found[path.stem] = made
+            sockets[path.stem] = made
         except OSError as problem:
             made.close()
             if isinstance(problem, ConnectionRefusedError):  # its program was killed
                 with contextlib.suppress(OSError):
                     path.unlink()
-    chosen = found.pop(number or next(iter(found), ""), None) if number or len(found) == 1 else None
-    for other in found.values():
+    chosen = sockets.pop(number or next(iter(sockets), ""), None) if number or len(sockets) == 1 else None
+    for other in sockets.values():
         other.close()
     if chosen is not None:
         return chosen
@@ -122,7 +122,7 @@ def splice(made: socket.socket) -> None:
 
     threading.Thread(target=up, name="to the screen", daemon=True).start()  # a full output delays no stop
     with contextlib.suppress(OSError):
-        while data := made.recv(_READ):
+        while data := made.recv(_READ_BYTES):
             while data:
                 data = data[os.write(1, data) :]
 

@@ -23,17 +23,17 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent
 from multidrop.drives.stopping import Fate
-from multidrop.features.shared_screen.wire import Dropped, Garbled, Heard, Item, Items, Now
+from multidrop.features.shared_screen.wire import Dropped, GarbledMessage, Item, Items, Now, StopHeard
 from multidrop.macros import MacroStore
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.opening import OpenedBus
 from multidrop.shell.events import Failed, OnBus, SessionEvent
 from multidrop.shell.line_syntax import Place, TypedLine
 from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.origin import Origin
 from multidrop.shell.playing import Playing
 from multidrop.shell.session import Session
-from multidrop.shell.stop_report import Found, Tally
+from multidrop.shell.stop_report import DriveFate, FateTally
 from multidrop.transports import Lost, Received, Transport
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
@@ -51,7 +51,7 @@ if sys.platform != "win32":
 assert sys.platform != "win32"
 
 HOST = "the host"
-PATIENCE = 1.0
+STOP_REPLY_TIMEOUT = 1.0
 """Seconds in which the host confirms a stop."""
 SILENCE = 3.0
 """Seconds without a sign of life that are said."""
@@ -63,7 +63,7 @@ READ_ONLY = "read only; Ctrl+X stops everything there, Ctrl+Q leaves"
 REFUSED = "this screen only watches: Ctrl+X stops everything, and all other lines are typed at the host"
 
 
-class Host:
+class WatchedHost:
     """What a watcher knows of the host: its state and clock, and what became of the stops sent to it."""
 
     def __init__(self, stops: Stops) -> None:
@@ -80,7 +80,9 @@ class Host:
     def take(self, state: Shared) -> None:
         self.shared = state
         self.figures = {
-            (each.bus, each.address, axis): figures for each in state.readouts for axis, figures in each.figures
+            (readout.bus, readout.address, axis): figures
+            for readout in state.readouts
+            for axis, figures in readout.figures
         }
 
     def tick(self, at: float) -> None:
@@ -105,7 +107,7 @@ class Host:
         if not self.pending:
             return ""
         waited = asyncio.get_running_loop().time() - self._asked_at
-        late = "no reply" if self.stops.heard < self.stops.sent and waited > PATIENCE else ""
+        late = "no reply" if self.stops.heard < self.stops.sent and waited > STOP_REPLY_TIMEOUT else ""
         return self.stops.trouble or late
 
     @property
@@ -155,7 +157,7 @@ class HostLog:
 class Mirror(Session):
     """The session of a watcher. Its stop goes to the host, and nothing else does."""
 
-    def __init__(self, settings: Settings, host: Host, receiver: Receiver) -> None:
+    def __init__(self, settings: Settings, host: WatchedHost, receiver: Receiver) -> None:
         self._host, self._receiver = host, receiver
         self._ahead = 0
         """Stops that another thread has sent, and the loop has not taken over."""
@@ -179,7 +181,9 @@ class Mirror(Session):
         self.said = self._host.words
         self.latched = state.latched or self._host.pending
         self.plotted = state.plotted
-        self.playing = [Playing(each.name, each.steps, 1, each.key, 0, each.step, None, None) for each in state.macros]
+        self.playing = [
+            Playing(macro.name, macro.steps, 1, macro.key, 0, macro.step, None, None) for macro in state.macros
+        ]
         self.log = HostLog(state.log) if state.log else None
         if state.stops > self._seen >= 0:
             others = state.stops - self._seen - self._own
@@ -208,12 +212,12 @@ class Mirror(Session):
         self.questions.open.stop()
         self.changed()
 
-    def tally(self) -> Tally:
+    def tally(self) -> FateTally:
         state, trouble = self._host.shared, self._host.trouble
         if trouble or self._host.pending:
             fate = Fate.NOT_REACHED if trouble else Fate.SENT
-            return Tally(self.wall(self.stopped_at), (Found(fate, HOST, HOST, trouble),))
-        return Tally(self.wall(state.stopped_at), state.found, state.vain)
+            return FateTally(self.wall(self.stopped_at), (DriveFate(fate, HOST, HOST, trouble),))
+        return FateTally(self.wall(state.stopped_at), state.found, state.vain)
 
     # What is typed
 
@@ -279,7 +283,7 @@ class Watching(Purpose):
 class MirrorModel(ScreenModel):
     """A screen model that takes values of a host without making records of them: those come by themselves."""
 
-    def __init__(self, session: Session, host: Host) -> None:
+    def __init__(self, session: Session, host: WatchedHost) -> None:
         super().__init__(
             lambda: session.selected_bus,
             lambda: session.buses,
@@ -299,7 +303,7 @@ class MirrorModel(ScreenModel):
 class Receiver:
     """Takes what the host sends into the app and its session."""
 
-    def __init__(self, connection: SocketStream, host: Host, name: str, early: bytes) -> None:
+    def __init__(self, connection: SocketStream, host: WatchedHost, name: str, early: bytes) -> None:
         """`name`: of the host; `early`: what it has sent already."""
         self._connection, self._host, self._name, self._early = connection, host, name, early
         self._shared: dict[Bus, SharedBus] = {}
@@ -326,14 +330,14 @@ class Receiver:
                 self._app.frames.wake()
                 if not (data := await self._connection.read_some()):
                     break
-        except Garbled as problem:
+        except GarbledMessage as problem:
             why = f"it sends what a shared screen does not ({problem})"
         finally:
             watch.cancel()
         self._host.over = why or self._connection.last_words() or "it has ended, or the connection is lost"
         self._host.stops.over(self._host.over)
         state = self._host.shared
-        buses = tuple(each._replace(lost=f"{HOST} is gone") for each in state.buses)
+        buses = tuple(bus._replace(lost=f"{HOST} is gone") for bus in state.buses)
         await self._apply(state._replace(buses=buses, watchers=()))
         self._session.notify(
             f"{HOST} is gone: {self._host.over}; nothing here is current, and a stop reaches nothing", warning=True
@@ -359,7 +363,7 @@ class Receiver:
                     self._model.trouble = record.text
             case Now(at):
                 self._host.tick(at)
-            case Heard(stops):
+            case StopHeard(stops):
                 self._host.stops.heard = stops
             case Dropped(number):
                 self._app.show_line(f"{number} lines and values were dropped: this screen was not read in time", "!")
@@ -373,12 +377,12 @@ class Receiver:
         own = session.place
         follows = own in (Place("", ""), Place(*before.selected))
         self._host.take(state)
-        numbers = {each.number: bus for bus, each in self._shared.items()}
+        numbers = {opening.number: bus for bus, opening in self._shared.items()}
         for each in state.buses:
             bus = numbers.pop(each.number, None)
             if bus is None:
                 bus = Bus(each.name, Elsewhere(each.port, each.lost), family=_family(each))
-                session.adopt(Opened(bus, Hints()), len(session.buses))
+                session.adopt(OpenedBus(bus, Hints()), len(session.buses))
                 self._shared[bus] = each._replace(drives=())
             self._update(bus, each)
         for gone in numbers.values():
@@ -407,13 +411,13 @@ class Receiver:
         if before.drives == now.drives:
             return
         bus.roster.drives.clear()
-        for each in now.drives:
-            _add(bus, each)
+        for drive in now.drives:
+            _add(bus, drive)
         self._session.identified(bus)
 
 
 def _family(bus: SharedBus) -> str:
-    return next((each.family for each in bus.drives if each.family in FAMILIES), "")
+    return next((drive.family for drive in bus.drives if drive.family in FAMILIES), "")
 
 
 def _add(bus: Bus, drive: SharedDrive) -> None:
@@ -431,4 +435,4 @@ def watch(
     connection: SocketStream, name: str, early: bytes, settings: Settings, driver: type[Driver] | None = None
 ) -> MultidropApp:
     """Make the app of a watcher. `name`: of the host; `early`: what it has sent already."""
-    return Receiver(connection, Host(Stops(connection)), name, early).app(settings, driver)
+    return Receiver(connection, WatchedHost(Stops(connection)), name, early).app(settings, driver)

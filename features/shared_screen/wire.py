@@ -2,7 +2,7 @@
 
 Each end first sends a greeting with its version. Then the host sends lines. Each is a list of items, and an item is
 the name of a type, a bus, and the value: named tuples and dataclasses as lists of their fields, enumerations by name.
-A watcher sends nothing but the stop, 0x18, which the host confirms at once with `Heard`.
+A watcher sends nothing but the stop, 0x18, which the host confirms at once with `StopHeard`.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from multidrop.shell.secrets import without_secrets
 
 WORD = "multidrop-screen"
 STOP = b"\x18"
-LONGEST = 4 * 1024 * 1024
+LONGEST_MESSAGE_LINE = 4 * 1024 * 1024
 """The greatest length of a line, bytes."""
 LONGEST_GREETING = 200
 NAME = 40
 """The greatest length of a watcher's name."""
 
 
-class Garbled(ValueError):
+class GarbledMessage(ValueError):
     """The bytes are not those of a shared screen."""
 
 
-class Heard(NamedTuple):
+class StopHeard(NamedTuple):
     """The host has written the stop that a watcher sent, once for each of its stops so far."""
 
     stops: int
@@ -73,7 +73,7 @@ def greeted(line: bytes) -> tuple[str, str]:
     word, _, rest = line.decode(errors="replace").strip().partition(" ")
     version, _, name = rest.partition(" ")
     if word != WORD or not version or len(line) > LONGEST_GREETING:
-        raise Garbled("no greeting of a shared screen")
+        raise GarbledMessage("no greeting of a shared screen")
     return visible(version), visible(name)[:NAME] or "a watcher"
 
 
@@ -95,9 +95,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.name
     if isinstance(value, tuple | frozenset):
-        return [_plain(each) for each in value]
+        return [_plain(item) for item in value]
     if dataclasses.is_dataclass(value):
-        return [_plain(getattr(value, each.name)) for each in dataclasses.fields(value)]
+        return [_plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
     return value
 
 
@@ -105,30 +105,30 @@ class Items:
     """The items of the lines that arrive, whatever pieces they come in. `types`: the types of values that are known."""
 
     def __init__(self, types: Iterable[type]) -> None:
-        self._types: Mapping[str, type] = {each.__name__: each for each in types}
+        self._types: Mapping[str, type] = {kind.__name__: kind for kind in types}
         self._held = b""
 
     def take(self, data: bytes) -> list[Item]:
         """Take bytes; return the items of the lines that are complete. Raises Garbled."""
         *lines, self._held = (self._held + data).split(b"\n")
-        if len(self._held) > LONGEST:
-            raise Garbled(f"a line of more than {LONGEST} bytes")
-        return [item for each in lines for item in self._items(each)]
+        if len(self._held) > LONGEST_MESSAGE_LINE:
+            raise GarbledMessage(f"a line of more than {LONGEST_MESSAGE_LINE} bytes")
+        return [item for line in lines for item in self._items(line)]
 
     def _items(self, line: bytes) -> list[Item]:
         try:
             rows = json.loads(line)
         except (ValueError, RecursionError):
-            raise Garbled("a line that is not JSON") from None
+            raise GarbledMessage("a line that is not JSON") from None
         if not isinstance(rows, list):
-            raise Garbled("a line that is not a list")
+            raise GarbledMessage("a line that is not a list")
         return [self._item(row) for row in rows]
 
     def _item(self, row: Any) -> Item:
         match row:
             case [str(name), str(bus), value] if name in self._types:
                 return Item(_read(self._types[name], value), bus)
-        raise Garbled("an item of no known type")
+        raise GarbledMessage("an item of no known type")
 
 
 def _read(kind: Any, value: Any) -> Any:
@@ -147,7 +147,7 @@ def _read(kind: Any, value: Any) -> Any:
         if len(kinds) == len(value):
             fields = map(_read, kinds, value)
             return tuple(fields) if form is tuple or form is Sequence else kind(*fields)
-    raise Garbled(f"{str(value)[:NAME]!r} is no {getattr(kind, '__name__', 'tuple')}")
+    raise GarbledMessage(f"{str(value)[:NAME]!r} is no {getattr(kind, '__name__', 'tuple')}")
 
 
 @cache
@@ -155,7 +155,7 @@ def _form(kind: Any) -> tuple[Any, list[Any], tuple[type, ...]]:
     """How a type is read, the types in it, and those of JSON that it takes: a scalar has the form None."""
     origin, inner = get_origin(kind), list(get_args(kind))
     if origin is UnionType:
-        return UnionType, [each for each in inner if each is not NoneType], ()
+        return UnionType, [form for form in inner if form is not NoneType], ()
     if origin is tuple:
         return (Sequence, inner[:1], ()) if inner[1:] == [...] else (tuple, inner, ())
     if issubclass(kind, Enum):
@@ -163,5 +163,5 @@ def _form(kind: Any) -> tuple[Any, list[Any], tuple[type, ...]]:
     if kind in (str, bool, int, float):
         return None, [], (float, int) if kind is float else (kind,)
     hints = get_type_hints(kind)
-    names = kind._fields if issubclass(kind, tuple) else [each.name for each in dataclasses.fields(kind)]
+    names = kind._fields if issubclass(kind, tuple) else [field.name for field in dataclasses.fields(kind)]
     return kind, [hints[name] for name in names], ()

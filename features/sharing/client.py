@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from multidrop.drives.half_line import Parts, Rest
+from multidrop.drives.half_line import FrameDivider, Rest
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
 
-HELD = 1 << 16
+MOST_HELD_BYTES = 1 << 16
 """Bytes that are kept for a client that has suspended the flow to it."""
 INTERRUPTS = (b"\xff\xf4\xff\xfd\x06", b"\xff\xf4")
 """Ctrl+C of a telnet program that has negotiated nothing: IAC IP, mostly with a request to mark the time."""
@@ -28,18 +28,18 @@ _LENGTHS: dict[int, int] = {
 
 
 @dataclass(frozen=True)
-class Request:
+class ClientRequest:
     """A client's request for a setting."""
 
     setting: int
     value: int
 
 
-Input = bytes | Request
+Input = bytes | ClientRequest
 """What a client sends: bytes for the line, or a request."""
 
 
-class Client:
+class ClientStream:
     """Divides the bytes of one client into data and requests, and encodes the bytes for it."""
 
     def __init__(self, name: str, text: bool, size: int = 0) -> None:
@@ -56,7 +56,7 @@ class Client:
         self.begun = b""
         """The beginning of a line or message that came while another client wrote."""
         self.rest = Rest()
-        self.parts = Parts(size)
+        self.parts = FrameDivider(size)
         self.setting = False
         """A setting of its is being changed: what follows waits for that."""
         self._text = text
@@ -74,21 +74,21 @@ class Client:
             self._begun = True
             self._telnet = telnet.Decoder() if data[0] == telnet.IAC else None
         if self._telnet is None:
-            for each in INTERRUPTS if self._text else ():
-                data = data.replace(each, b"\x03")
+            for interrupt in INTERRUPTS if self._text else ():
+                data = data.replace(interrupt, b"\x03")
             return [data]
-        found: list[Input] = []
+        inputs: list[Input] = []
         for event in self._telnet.receive(data):
             if isinstance(event, telnet.Data):
                 # A telnet terminal sends a NUL after its CR.
-                found.append(event.data if self.com_port or not self._text else event.data.translate(None, b"\0"))
+                inputs.append(event.data if self.com_port or not self._text else event.data.translate(None, b"\0"))
             elif isinstance(event, telnet.Interrupt):
-                found.append(b"\x03")
+                inputs.append(b"\x03")
             elif isinstance(event, telnet.Option):
                 self._option(event)
             elif request := self._request(event.body):
-                found.append(request)
-        return [each for each in found if each]
+                inputs.append(request)
+        return [item for item in inputs if item]
 
     def _option(self, event: telnet.Option) -> None:
         if event.verb not in telnet.OPPOSITE:
@@ -109,16 +109,16 @@ class Client:
             self._offered.add((verb, option))
             self.replies += telnet.option(verb, option)
 
-    def _request(self, body: bytes) -> Request | None:
+    def _request(self, body: bytes) -> ClientRequest | None:
         """The request in a subnegotiation; None where it has no meaning."""
-        found = parsed(body)
-        if found is None or not self.com_port or found[0] not in _LENGTHS:
+        parts = parsed(body)
+        if parts is None or not self.com_port or parts[0] not in _LENGTHS:
             return None
-        setting, value = found[0], int.from_bytes(found[1])
-        valid = len(found[1]) == _LENGTHS[setting] and (setting != Setting.PURGE or 0 < value <= PURGE_BOTH)
-        return Request(setting, value) if valid else None
+        setting, value = parts[0], int.from_bytes(parts[1])
+        valid = len(parts[1]) == _LENGTHS[setting] and (setting != Setting.PURGE or 0 < value <= PURGE_BOTH)
+        return ClientRequest(setting, value) if valid else None
 
-    def answers(self, request: Request) -> bool:
+    def answers(self, request: ClientRequest) -> bool:
         """Answer a request that concerns this client alone; return whether it does."""
         if request.setting in (Setting.SUSPEND, Setting.RESUME):
             self._suspended = request.setting == Setting.SUSPEND
@@ -140,12 +140,12 @@ class Client:
         """
         waiting = tuple(self.waiting)
         self.waiting.clear()
-        for each in waiting:
-            if isinstance(each, Request) and each.setting == Setting.PURGE:
-                self.reply(each.setting, each.value)
-            elif isinstance(each, Request):
-                self.waiting.append(each)
-        return b"".join(each for each in waiting if isinstance(each, bytes))
+        for item in waiting:
+            if isinstance(item, ClientRequest) and item.setting == Setting.PURGE:
+                self.reply(item.setting, item.value)
+            elif isinstance(item, ClientRequest):
+                self.waiting.append(item)
+        return b"".join(item for item in waiting if isinstance(item, bytes))
 
     # To the client
 
@@ -168,8 +168,8 @@ class Client:
 
     @property
     def overflowed(self) -> bool:
-        """Whether more than `HELD` bytes wait for a client that has suspended the flow."""
-        return len(self._held) > HELD
+        """Whether more than `MOST_HELD_BYTES` bytes wait for a client that has suspended the flow."""
+        return len(self._held) > MOST_HELD_BYTES
 
     def farewell(self, reason: str) -> bytes:
         """The reason as the connection is closed: a signature with RFC 2217, a line for a telnet terminal."""

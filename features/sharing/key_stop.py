@@ -15,12 +15,12 @@ from multidrop.drives import pacing
 from multidrop.features.sharing.stop_bytes import StopBytes
 from multidrop.transports import Transport
 
-AGAIN = 0.02
+LOOK_PERIOD = 0.02
 """The time between two looks at bytes that wait, s."""
 
 
 @dataclass
-class Begun:
+class ThreadStop:
     """A stop that the thread has begun, and the loop has not taken over."""
 
     written: list[StopPiece] = field(default_factory=list)
@@ -47,7 +47,7 @@ class KeyStop:
         self.transport: Transport
         self.baud = 0
         self._stops, self._cut, self._leaving = stops, cut, leaving
-        self._begun = Begun()
+        self._begun = ThreadStop()
         pacing.PACER.begin()
 
     def press(self) -> None:
@@ -57,22 +57,22 @@ class KeyStop:
             transport.preempt(stops.framed, self._first)
         self._pace()
 
-    def take(self) -> Begun | None:
+    def take(self) -> ThreadStop | None:
         """Take over what was begun; None: the thread has written nothing. After the last key nothing goes on there."""
-        taken = Begun()
+        taken = ThreadStop()
 
         def note(last: bool) -> None:
             nonlocal taken
             begun = self._begun
-            taken = Begun(begun.written, begun.left if last else [], begun.due, begun.dropped)
-            self._begun = Begun(left=[] if last else begun.left, due=begun.due)
+            taken = ThreadStop(begun.written, begun.left if last else [], begun.due, begun.dropped)
+            self._begun = ThreadStop(left=[] if last else begun.left, due=begun.due)
 
         self.transport.yielded(note)
         return taken if taken.written else None
 
     def forget(self) -> None:
         """Forget what was begun: it went to a port that is lost."""
-        self._begun = Begun()
+        self._begun = ThreadStop()
 
     def _first(self, dropped: int) -> bytes:
         begun = self._begun
@@ -106,7 +106,7 @@ class KeyStop:
     def _pace(self) -> None:
         if self._begun.left:
             left = self._begun.due - time.monotonic()
-            pacing.PACER.after(self, left if left > 0 else AGAIN, self._go_on)
+            pacing.PACER.after(self, left if left > 0 else LOOK_PERIOD, self._go_on)
 
     def _go_on(self) -> None:
         if self.transport.follow(self._next):

@@ -1,4 +1,4 @@
-"""`multidrop share`: lend a port to several clients until a signal: sockets around an `Exchange`.
+"""`multidrop share`: lend a port to several clients until a signal: sockets around an `PortClients`.
 
 The port comes back after a loss, as a lost bus does.
 """
@@ -23,19 +23,19 @@ from multidrop.features.sharing.writer_turns import (
     NEVER,
     NOT_REACHED,
     Action,
+    ClientWrite,
     Close,
-    Exchange,
+    PortClients,
     Purge,
     Say,
     Send,
     Set,
     Stop,
-    Write,
 )
 from multidrop.shell import configuration
 from multidrop.shell.connect import Pauses
 from multidrop.shell.connect.opening import OpenedPort, open_port
-from multidrop.shell.connect.reconnect import FIRST, LONGEST, limit_of
+from multidrop.shell.connect.reconnect import FIRST_RETRY_PAUSE, LONGEST_RETRY_PAUSE, limit_of
 from multidrop.shell.connect.urls import listening, parse
 from multidrop.shell.events import FAILURES
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
@@ -44,9 +44,9 @@ from multidrop.transports import PortControl
 from multidrop.transports.sockets import explain, exposed, host_port, set_socket_options
 from multidrop.transports.telnet import Control, Setting
 
-UNREAD = 1 << 18
+MOST_UNREAD_BYTES = 1 << 18
 """Bytes that a client may leave unread before it is disconnected."""
-AHEAD = 1 << 18
+MOST_BYTES_AHEAD = 1 << 18
 """Bytes that the writer may be ahead of the line. Within them its own stop is read at once."""
 CLIENTS = 32
 READ = 1 << 12
@@ -71,14 +71,14 @@ class SharedPort:
         self._loop = asyncio.get_running_loop()
         control = self._transport.control
         self._own = stops.own
-        self._exchange = Exchange(stops, control.baud if control else port.baud)
+        self._exchange = PortClients(stops, control.baud if control else port.baud)
         self._key = KeyStop(stops, lambda: bool(self._purged) or self._exchange.line_begun, lambda: self._only_stop)
         self._key.transport, self._key.baud = self._transport, control.baud if control else 0
         self._taken: int | None = None
         """The bytes that made room for a stop which the key's thread has written already."""
         self._refused = 0
         """Bytes of clients that came while only that thread could write."""
-        self._connections: dict[int, Connection] = {}
+        self._connections: dict[int, ClientConnection] = {}
         self._left = asyncio.Event()
         """No client is connected."""
         self._left.set()
@@ -96,7 +96,7 @@ class SharedPort:
 
     async def open(self, host: str, port: int) -> str:
         """Listen; return the URL for clients. Raises OSError."""
-        self._server = await self._loop.create_server(lambda: Connection(self), host, port)
+        self._server = await self._loop.create_server(lambda: ClientConnection(self), host, port)
         self._transport.start(self._received, self._broke)
         return f"rfc2217://{host_port(host, self._server.sockets[0].getsockname()[1])}"
 
@@ -157,7 +157,7 @@ class SharedPort:
 
     # Clients
 
-    def connected(self, connection: Connection, name: str) -> int:
+    def connected(self, connection: ClientConnection, name: str) -> int:
         self._number += 1
         self._connections[self._number] = connection
         self._left.clear()
@@ -201,15 +201,17 @@ class SharedPort:
             elif isinstance(action, Send):
                 connection = self._connections.get(action.client)
                 if connection is not None and not connection.send(action.data):
-                    self._do(self._exchange.close(action.client, "dropped", f"it left {UNREAD} bytes unread"))
+                    self._do(
+                        self._exchange.close(action.client, "dropped", f"it left {MOST_UNREAD_BYTES} bytes unread")
+                    )
                     connection.abort()
             elif isinstance(action, Close):
                 self._connections[action.client].say_goodbye(action.farewell)
-            elif isinstance(action, Write):
-                if self._transport.pending > AHEAD and action.client in self._exchange.clients:
+            elif isinstance(action, ClientWrite):
+                if self._transport.pending > MOST_BYTES_AHEAD and action.client in self._exchange.clients:
                     lost = counted(len(action.data), "byte")
                     self._exchange.unwritten(self._loop.time())
-                    ahead = f"it wrote {AHEAD} bytes more than the line has taken; {lost} dropped"
+                    ahead = f"it wrote {MOST_BYTES_AHEAD} bytes more than the line has taken; {lost} dropped"
                     self._do(self._exchange.close(action.client, "dropped", ahead))
                     continue
                 self._purged, self._only_stop = 0, False
@@ -258,7 +260,7 @@ class SharedPort:
     async def _return(self) -> None:
         """Open the port again, as a lost bus is."""
         assert self._port.reopen is not None
-        pauses = Pauses(FIRST, LONGEST)
+        pauses = Pauses(FIRST_RETRY_PAUSE, LONGEST_RETRY_PAUSE)
         while self._loss is not None:
             await asyncio.sleep(pauses.now)
             try:
@@ -293,7 +295,7 @@ def _change(control: PortControl, action: Set) -> Callable[[], None]:
     return partial(lines[action.value if on else action.value - 1], on)
 
 
-class Connection(asyncio.BufferedProtocol):
+class ClientConnection(asyncio.BufferedProtocol):
     """One client's connection."""
 
     def __init__(self, port: SharedPort) -> None:
@@ -327,7 +329,7 @@ class Connection(asyncio.BufferedProtocol):
         if self._transport is None or self._transport.is_closing():
             return True
         self._transport.write(data)
-        return self._transport.get_write_buffer_size() <= UNREAD
+        return self._transport.get_write_buffer_size() <= MOST_UNREAD_BYTES
 
     def say_goodbye(self, farewell: bytes) -> None:
         """Send the reason and the end of the stream. Stops are taken for a while: one may be on its way."""
@@ -349,7 +351,7 @@ class Connection(asyncio.BufferedProtocol):
             self._transport.abort()
 
 
-AGAIN = 10.0
+REFUSAL_PERIOD = 10.0
 """Seconds for which a client that tries again and again is refused without another line."""
 _SENT_AWAY = ("refused", "lost")
 _REPEATED = ("connected", "left", *_SENT_AWAY)
@@ -438,7 +440,9 @@ class Narrator:
     def _repeated(self, event: Say, now: float) -> bool:
         """Whether a client of a host was refused a moment ago: one that connects again by itself is said once."""
         host = event.client.rpartition(":")[0]
-        again = bool(host) and event.event in _REPEATED and now < self._refused.get(host, -AGAIN) + AGAIN
+        again = (
+            bool(host) and event.event in _REPEATED and now < self._refused.get(host, -REFUSAL_PERIOD) + REFUSAL_PERIOD
+        )
         if host and event.event in _SENT_AWAY and not again:
-            self._refused = {host: now, **{each: at for each, at in self._refused.items() if now < at + AGAIN}}
+            self._refused = {host: now, **{each: at for each, at in self._refused.items() if now < at + REFUSAL_PERIOD}}
         return again

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects import StopPiece
 from multidrop.dialects.families import DEFAULT, FAMILIES, dialects
-from multidrop.drives.half_line import CR, LF, LONGEST
+from multidrop.drives.half_line import CR, LF, LONGEST_KEPT_TEXT
 
 ENDS = b"\r\n"
 KEYS = rb"[\x03\x1b]"
@@ -22,7 +22,7 @@ CERTAIN = 1.0
 """Bytes that the drives send so many seconds after a stop, or later, show that the stop has left."""
 NOTICED = 10.0
 """Seconds within which a loss is noticed, also that of a host: what was written before has left."""
-GAP = 0.1
+STOP_PIECE_QUIET = 0.1
 """Seconds between pieces of a stop that is owed: replies do not collide."""
 _FORMS = 16
 """The forms of a stop that are kept."""
@@ -56,7 +56,7 @@ class StopBytes:
         matches = [*self.pattern.finditer(data)]
         if not matches:
             return data, b"", b""
-        return data[: matches[0].start()], b"".join(each[0] for each in matches), data[matches[-1].end() :]
+        return data[: matches[0].start()], b"".join(match[0] for match in matches), data[matches[-1].end() :]
 
     def keyed(self, data: bytes) -> bool:
         """Whether bytes hold a stop that is a key, which ends no line."""
@@ -66,7 +66,7 @@ class StopBytes:
         """Divide bytes: whole lines or messages, and what the next read may make one of."""
         size = len(self.own[0].data)
         at = len(data) // size * size if self.framed else max(data.rfind(b"\r"), data.rfind(b"\n")) + 1
-        return (data, b"") if len(data) - at > LONGEST else (data[:at], data[at:])
+        return (data, b"") if len(data) - at > LONGEST_KEPT_TEXT else (data[:at], data[at:])
 
     @property
     def size(self) -> int:
@@ -119,7 +119,7 @@ class OwedStop:
     def pieces(self) -> list[StopPiece]:
         """All of it, in every form of this side and as the senders sent it."""
         first, *others = self._own
-        forms = [StopPiece(each, GAP) for each in self._senders if each]
+        forms = [StopPiece(sender, STOP_PIECE_QUIET) for sender in self._senders if sender]
         return [first, *forms, *others] if self._senders else []
 
     def note(self, who: str, stop: bytes, now: float) -> None:
@@ -153,18 +153,18 @@ def stop_bytes(family: str, drives: Sequence[str] = (), party: bool | None = Non
     `party`: whether the drives use names; None: not known, unless several drives are.
     """
     names = [family] if family else [name for name, row in dialects().items() if not row.scheme]
-    shared = [each for name in names if (each := FAMILIES[name]).stop_bytes is not None]
+    shared = [kind for name in names if (kind := FAMILIES[name]).stop_bytes is not None]
     if not shared:
         valid = "an Ethernet drive takes several clients itself"
         raise Diagnostic(f"a line of {family} cannot be shared", hint=valid)
     framed = bool(family) and shared[0].codec.framed
-    found = [each.stop_bytes.pattern for each in shared if each.stop_bytes and each.codec.framed == framed]
+    forms = [each.stop_bytes.pattern for each in shared if each.stop_bytes and each.codec.framed == framed]
     codec, language = FAMILIES[family or DEFAULT].codec, FAMILIES[family or DEFAULT].language
     own = (StopPiece(codec.stop(drives, False), 0.0), *codec.stop_again(drives, False))
     if framed:
-        pattern = re.compile(b"(?:" + found[0] + b")+", re.DOTALL)
+        pattern = re.compile(b"(?:" + forms[0] + b")+", re.DOTALL)
         return StopBytes(pattern, True, moves=shared[0].message_moves, own=own)
-    pattern = re.compile(b"|".join([*found, KEYS]))
+    pattern = re.compile(b"|".join([*forms, KEYS]))
 
     def moves(line: bytes) -> bool:
         text = _ADDRESS_OR_CHECKSUM.sub("", line.decode("latin-1"))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from multidrop.base.text import counted, visible
 from multidrop.drives.half_line import HalfLine
-from multidrop.features.sharing.client import Client, Input, Request
+from multidrop.features.sharing.client import ClientRequest, ClientStream, Input
 from multidrop.features.sharing.settling import Settling
 from multidrop.features.sharing.stop_bytes import ENDS, NOTICED, OwedStop, StopBytes
 from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
@@ -38,7 +38,7 @@ class Close:
 
 
 @dataclass(frozen=True)
-class Write:
+class ClientWrite:
     """Write bytes to the port, for a client."""
 
     client: int
@@ -76,12 +76,12 @@ class Say:
     detail: str = ""
 
 
-Action = Send | Close | Write | Stop | Purge | Set | Say
+Action = Send | Close | ClientWrite | Stop | Purge | Set | Say
 
 
-SILENT = 10.0
+WRITER_TIMEOUT = 10.0
 """Seconds of silence after which another client may write."""
-TURN = 8
+WRITES_A_TURN = 8
 """The requests and writes of one client that are worked off before the others are read."""
 WAITING = 1024
 """The requests and writes that may wait for one client."""
@@ -91,11 +91,11 @@ NEVER = "the stop is never written, drives may run on: stop them at the machine"
 _ASKS = (Control.ASK_FLOW, Control.ASK_BREAK, Control.ASK_DTR, Control.ASK_RTS, Control.ASK_FLOW_IN)
 
 
-class Exchange:
+class PortClients:
     """The clients of a port, by number."""
 
     def __init__(self, stops: StopBytes, baud: int) -> None:
-        self.clients: dict[int, Client] = {}
+        self.clients: dict[int, ClientStream] = {}
         self.writer: int | None = None
         self.framed = stops.framed
         self.values: dict[str, int] = {
@@ -131,23 +131,23 @@ class Exchange:
     @property
     def deadline(self) -> float | None:
         """The time of the next `advance`: 0.0 while clients wait for a turn, else when the writer has been silent."""
-        if any(each.waiting and not each.setting for each in self.clients.values()):
+        if any(client.waiting and not client.setting for client in self.clients.values()):
             return self.settling.until
-        return None if self.writer is None else self._last + SILENT
+        return None if self.writer is None else self._last + WRITER_TIMEOUT
 
     # Clients
 
     def connect(self, client: int, name: str) -> list[Action]:
-        self.clients[client] = Client(name, not self.framed, self._stops.size)
+        self.clients[client] = ClientStream(name, not self.framed, self._stops.size)
         self._say(client, "connected")
         return self._done()
 
     def leave(self, client: int) -> list[Action]:
         if client in self.clients:
             if self.writer in (None, client):
-                for each in self.clients[client].waiting:
-                    if isinstance(each, bytes):
-                        self._write(client, each, self._last, gone=True)
+                for item in self.clients[client].waiting:
+                    if isinstance(item, bytes):
+                        self._write(client, item, self._last, gone=True)
             self._unsent(
                 client, self.clients[client].parts.forgotten(), "the beginning of a message", "its client left"
             )
@@ -182,7 +182,7 @@ class Exchange:
         return self._done()
 
     def _release(self, now: float) -> None:
-        if self.writer is not None and now >= self._last + SILENT:
+        if self.writer is not None and now >= self._last + WRITER_TIMEOUT:
             self._say(self.writer, "silent", "another client may write")
             self.writer = None
 
@@ -234,8 +234,8 @@ class Exchange:
         """Take bytes that a client has sent."""
         self._release(now)
         known = self.clients[client]
-        for each in known.receive(data):
-            known.waiting.extend([each] if isinstance(each, Request) else self._without_stops(client, each, now))
+        for item in known.receive(data):
+            known.waiting.extend([item] if isinstance(item, ClientRequest) else self._without_stops(client, item, now))
         if self._away:
             stopped = known.name in self.owed.names
             self._close(client, "lost", f"{self._away}; {NOT_REACHED}: {OWED}" if stopped else self._away)
@@ -274,7 +274,7 @@ class Exchange:
                 f"{counted(lost, 'byte that came with a stop was', 'bytes that came with a stop were')} dropped",
             )
             before = b""
-        return [each for each in (before, rest) if each]
+        return [part for part in (before, rest) if part]
 
     def stop(self, stop: bytes, now: float, owed: bool = False) -> list[Action]:
         """Write a stop of this side, or one that was `owed`: the loss may have cut a line, which it makes harmless."""
@@ -295,7 +295,7 @@ class Exchange:
 
         Within a line of another client it first makes that line harmless: a drive may take both for one command.
         """
-        waited = {number: each.overtaken() for number, each in self.clients.items()}
+        waited = {number: client.overtaken() for number, client in self.clients.items()}
         if others and self.writer is not None:
             waiting = dict(self._line.open)  # the bytes that a stop overtakes are not written
             self._line.written(waited[self.writer], now)
@@ -323,12 +323,14 @@ class Exchange:
 
     def _work(self, client: int, now: float) -> None:
         """Work off a few requests and writes of a client: the others are read after that."""
-        known, left = self.clients[client], TURN
+        known, left = self.clients[client], WRITES_A_TURN
         while known.waiting and left and not known.setting:
-            each, left = known.waiting.popleft(), left - 1
-            done = self._request(client, each, now) if isinstance(each, Request) else self._write(client, each, now)
+            item, left = known.waiting.popleft(), left - 1
+            done = (
+                self._request(client, item, now) if isinstance(item, ClientRequest) else self._write(client, item, now)
+            )
             if not done:
-                known.waiting.appendleft(each)
+                known.waiting.appendleft(item)
                 break
         if not known.refused and (replies := known.taken()):
             self._actions.append(Send(client, replies))
@@ -342,7 +344,7 @@ class Exchange:
             self._begin(client, now)
         elif client != self.writer:
             name = self.clients[self.writer].name
-            self._close(client, "refused", f"{name} writes, until it leaves or is silent for {SILENT:g} s")
+            self._close(client, "refused", f"{name} writes, until it leaves or is silent for {WRITER_TIMEOUT:g} s")
             return True
         self._last = now
         if not (gone or self._settled(client, now)):
@@ -352,7 +354,7 @@ class Exchange:
         if left := known.parts.whole(left):
             if any(map(self._stops.moves, self._line.written(left, now))):
                 self.owed.started()
-            self._actions.append(Write(client, left))
+            self._actions.append(ClientWrite(client, left))
             self._answered = False
         return True
 
@@ -381,7 +383,7 @@ class Exchange:
         stops = "; it may hold commands that only a stop drops, so the drives were stopped" * self._line.waits
         self._say(client, "unfinished", f"'{text}' of the writer before is made harmless{stops}")
         harmless = self._stops.harmless(self._line.waits)
-        self._actions.append(Write(client, harmless))
+        self._actions.append(ClientWrite(client, harmless))
         self.settling.begin(now, len(harmless), self.values["baud"])
         if self._line.text:
             self._drop_rest()
@@ -390,12 +392,12 @@ class Exchange:
     def over(self) -> list[Action]:
         """Make harmless what was begun: sharing ends, and others use the port then."""
         if self._line.begun and not self._away:
-            self._actions.append(Write(self._before or 0, self._stops.harmless(self._line.waits)))
+            self._actions.append(ClientWrite(self._before or 0, self._stops.harmless(self._line.waits)))
             self._line.cleared()
         return self._done()
 
     def unwritten(self, now: float) -> None:
-        """Note that bytes of the last `Write` were not written."""
+        """Note that bytes of the last `ClientWrite` were not written."""
         self._line.doubted(now)
 
     def dropped(self, count: int, purged: bool = False, now: float = 0.0) -> list[Action]:
@@ -415,7 +417,7 @@ class Exchange:
 
     # Settings
 
-    def _request(self, client: int, request: Request, now: float) -> bool:
+    def _request(self, client: int, request: ClientRequest, now: float) -> bool:
         """Answer a request; return False where it must wait for the drives."""
         known = self.clients[client]
         if known.refused or known.answers(request):
@@ -434,7 +436,7 @@ class Exchange:
             known.reply(request.setting, NEEDED[Setting(request.setting)])
         return True
 
-    def _change(self, client: int, what: str, request: Request, changes: bool, now: float) -> bool:
+    def _change(self, client: int, what: str, request: ClientRequest, changes: bool, now: float) -> bool:
         """Change a setting if this client may, or reply with what holds; False where that must wait for the drives.
 
         At another baud rate the drives would not read what makes a begun line harmless, so that goes first.

@@ -10,13 +10,13 @@ from html import escape
 from itertools import groupby
 
 from multidrop.base.text import visible
-from multidrop.features.sweeps.plan import Plan
-from multidrop.features.sweeps.trial import MARGIN, Result, bench
+from multidrop.features.sweeps.plan import SweepPlan
+from multidrop.features.sweeps.trial import MARGIN, TrialResult, bench
 from multidrop.features.sweeps.variation import SEED, spelled
 
-MOST, STRETCHES = 200, 20
+MOST_VALUES, MOST_STRETCHES = 200, 20
 """The largest number of lines for a key; beyond it, the number of stretches of neighbouring values."""
-ROWS, COLUMNS, WIDTH = 40, 16, 78
+MOST_GRID_ROWS, COLUMNS, WIDTH = 40, 16, 78
 """The largest size of a map in a terminal."""
 SCATTERED = 10
 """The largest number of values that are named, where failing and passing ones alternate."""
@@ -24,7 +24,7 @@ _NUMBER = re.compile(r"[+-]?[\d.]+(?: \w+)?", re.ASCII)
 
 
 @dataclass
-class Tally:
+class CaseTally:
     """Cases that have something in common."""
 
     cases: int = 0
@@ -35,8 +35,8 @@ class Tally:
     def take(self, ok: bool, margins: Iterable[tuple[str, float]]) -> None:
         self.cases += 1
         self.passed += ok
-        for name, each in margins:
-            self.margins[name] = min(each, self.margins.get(name, each))
+        for name, margin in margins:
+            self.margins[name] = min(margin, self.margins.get(name, margin))
 
     @property
     def percent(self) -> int:
@@ -47,7 +47,7 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Axis:
+class SweptKey:
     """The values of a key that ran, or stretches of them. `at`: the label of each value, by its text."""
 
     name: str
@@ -57,14 +57,14 @@ class Axis:
     def labels(self) -> list[str]:
         return list(dict.fromkeys(self.at.values()))
 
-    def merged(self, most: int, stretches: int) -> Axis:
+    def merged(self, most: int, stretches: int) -> SweptKey:
         """The same with stretches in place of more than `most` values."""
         texts = list(self.at)
         if len(self.labels) <= most:
             return self
         size = -(-len(texts) // stretches)
         parts = (texts[begin : begin + size] for begin in range(0, len(texts), size))
-        return Axis(self.name, {text: _stretch(part) for part in parts for text in part})
+        return SweptKey(self.name, {text: _stretch(part) for part in parts for text in part})
 
 
 def _stretch(texts: Sequence[str]) -> str:
@@ -77,18 +77,20 @@ def _number(text: str) -> Decimal | None:
 
 def _sorted(texts: Iterable[str]) -> list[str]:
     """Texts by their numbers, where all have one; else as they are."""
-    found = {each: _number(each) for each in texts}
-    return sorted(found, key=lambda each: found[each] or Decimal()) if None not in found.values() else list(found)
+    numbers = {text: _number(text) for text in texts}
+    return (
+        sorted(numbers, key=lambda each: numbers[each] or Decimal()) if None not in numbers.values() else list(numbers)
+    )
 
 
-class Answer:
+class SweepAnswer:
     """The results of a sweep by value. `search`: the key whose boundary was searched; empty: a grid, or draws."""
 
-    def __init__(self, plan: Plan, results: Mapping[int, Result], search: str = "") -> None:
+    def __init__(self, plan: SweepPlan, results: Mapping[int, TrialResult], search: str = "") -> None:
         self._names = [visible(key.text) for key in plan.job.keys]
         self._search = search
         expects = plan.job.expects
-        columns = [each.removeprefix(MARGIN) for each in bench(plan.job).columns if each.startswith(MARGIN)]
+        columns = [column.removeprefix(MARGIN) for column in bench(plan.job).columns if column.startswith(MARGIN)]
         self._cases = [
             (
                 tuple(visible(spelled(value)) for value in plan.values_of(number)),
@@ -101,32 +103,32 @@ class Answer:
             )
             for number, result in sorted(results.items())
         ]
-        self._axes = [Axis(name, self._texts(at, plan)) for at, name in enumerate(self._names)]
+        self._axes = [SweptKey(name, self._texts(at, plan)) for at, name in enumerate(self._names)]
         # The two keys that matter most, as they are written: those whose values differ most in what passes.
         spread = {}
         for index, axis in enumerate(self._axes):
-            shares = [each.passed / each.cases for each in self._tallies(index, axis).values()]
+            shares = [tally.passed / tally.cases for tally in self._tallies(index, axis).values()]
             if len(axis.at) > 1 and plan.job.keys[index].part != SEED:
                 spread[index] = max(shares) - min(shares)
         self._pair = sorted(sorted(spread, key=lambda index: -spread[index])[:2])
 
-    def _texts(self, index: int, plan: Plan) -> dict[str, str]:
+    def _texts(self, index: int, plan: SweepPlan) -> dict[str, str]:
         texts: Iterable[str] = dict.fromkeys(texts[index] for texts, *_ in self._cases)
         if plan.asked.draws is not None or self._search:
             texts = _sorted(texts)
-        return {each: each for each in texts}
+        return {text: text for text in texts}
 
-    def _tallies(self, index: int, axis: Axis) -> dict[str, Tally]:
-        found: dict[str, Tally] = {}
+    def _tallies(self, index: int, axis: SweptKey) -> dict[str, CaseTally]:
+        tallies: dict[str, CaseTally] = {}
         for texts, ok, margins in self._cases:
-            found.setdefault(axis.at[texts[index]], Tally()).take(ok, margins)
-        return found
+            tallies.setdefault(axis.at[texts[index]], CaseTally()).take(ok, margins)
+        return tallies
 
     def rows(self) -> Iterator[str]:
         """A line for each value of each key: the share that passed, and the smallest margin."""
         lines = []
         for index, each in enumerate(self._axes):
-            axis = each.merged(MOST, STRETCHES)
+            axis = each.merged(MOST_VALUES, MOST_STRETCHES)
             tallies = self._tallies(index, axis)
             lines += [(f"{axis.name}={label}", tallies[label]) for label in axis.labels]
         width = max((len(name) for name, _ in lines), default=0)
@@ -135,50 +137,50 @@ class Answer:
                 f"{least:{'.0f' if abs(least) >= 1000 else '.4g'}} of {condition}"
                 for condition, least in tally.margins.items()
             )
-            found = f"{name:{width}}  {tally.percent:3}%  {tally.passed} of {tally.cases}"
-            yield found + f"  margin {margins}" * bool(margins)
+            row = f"{name:{width}}  {tally.percent:3}%  {tally.passed} of {tally.cases}"
+            yield row + f"  margin {margins}" * bool(margins)
 
-    def grid(self, rows: int, columns: int) -> tuple[Axis, Axis, dict[tuple[str, str], Tally]] | None:
+    def grid(self, rows: int, columns: int) -> tuple[SweptKey, SweptKey, dict[tuple[str, str], CaseTally]] | None:
         """The map: two axes, and what passed at each pair; None without two keys that have several values."""
         if len(self._pair) < 2 or self._search:
             return None
         down, across = self._pair
         first, second = self._axes[down].merged(rows, rows // 2), self._axes[across].merged(columns, columns)
-        found: dict[tuple[str, str], Tally] = {}
+        tallies: dict[tuple[str, str], CaseTally] = {}
         for texts, ok, _ in self._cases:
             place = first.at[texts[down]], second.at[texts[across]]
-            found.setdefault(place, Tally()).take(ok, ())
-        return first, second, found
+            tallies.setdefault(place, CaseTally()).take(ok, ())
+        return first, second, tallies
 
     def map(self, *, colours: bool = False) -> Iterator[str]:
         """The lines of the map; the numbers are per cent. Without colours it is plain ASCII."""
         for most in (COLUMNS, COLUMNS // 2, COLUMNS // 4):
-            if (grid := self.grid(ROWS, most)) is None:
+            if (grid := self.grid(MOST_GRID_ROWS, most)) is None:
                 return
-            first, second, found = grid
+            first, second, tallies = grid
             width, left = max(4, *map(len, second.labels)), max(map(len, (first.name, *first.labels)))
             if left + len(second.labels) * (width + 1) <= WIDTH:
                 break
         yield f"per cent that passed: {first.name} down, {second.name} across"
-        yield " ".join([f"{first.name:{left}}", *(f"{each:>{width}}" for each in second.labels)])
+        yield " ".join([f"{first.name:{left}}", *(f"{label:>{width}}" for label in second.labels)])
         for row in first.labels:
-            cells = [_cell(found.get((row, column)), width, colours) for column in second.labels]
+            cells = [_cell(tallies.get((row, column)), width, colours) for column in second.labels]
             yield " ".join([f"{row:{left}}", *cells])
 
     def svg(self) -> str:
         """The map as a picture; empty without one."""
-        if (grid := self.grid(ROWS, ROWS)) is None:
+        if (grid := self.grid(MOST_GRID_ROWS, MOST_GRID_ROWS)) is None:
             return ""
-        first, second, found = grid
+        first, second, tallies = grid
         left, top = 20 + 7 * max(map(len, (first.name, *first.labels))), 60
         wide = max(44, 12 + 7 * max(map(len, second.labels)))
         texts = [
             (10, 20, "start", f"per cent that passed: {first.name} down, {second.name} across"),
-            *((left + wide * at + wide // 2, 50, "middle", each) for at, each in enumerate(second.labels)),
-            *((left - 8, top + 24 * at + 17, "end", each) for at, each in enumerate(first.labels)),
+            *((left + wide * at + wide // 2, 50, "middle", label) for at, label in enumerate(second.labels)),
+            *((left - 8, top + 24 * at + 17, "end", label) for at, label in enumerate(first.labels)),
         ]
         parts = []
-        for (row, column), tally in found.items():
+        for (row, column), tally in tallies.items():
             x, y = left + wide * second.labels.index(column), top + 24 * first.labels.index(row)
             share = tally.passed / tally.cases
             colour = f"rgb({round(178 - 151 * share)},{round(24 + 96 * share)},{round(43 + 12 * share)})"
@@ -219,15 +221,15 @@ class Answer:
 
     def _said(self, first: int, others: Sequence[int]) -> list[tuple[tuple[str, str], list[str]]]:
         """Words for the values of a key that fail, at each place: the names and values of other keys."""
-        found: dict[tuple[str, ...], dict[str, bool]] = {}
-        axes = [self._axes[other].merged(MOST, STRETCHES) for other in others]
+        said: dict[tuple[str, ...], dict[str, bool]] = {}
+        axes = [self._axes[other].merged(MOST_VALUES, MOST_STRETCHES) for other in others]
         for texts, ok, _ in self._cases:
             place = tuple(axis.at[texts[other]] for other, axis in zip(others, axes, strict=True))
-            fails = found.setdefault(place, {})
+            fails = said.setdefault(place, {})
             fails[texts[first]] = fails.get(texts[first], False) or not ok
         name = self._names[first]
-        pairs = ([f"{axis.name} {value}" for axis, value in zip(axes, place, strict=True)] for place in found)
-        return [(_words(name, fails), pair) for fails, pair in zip(found.values(), pairs, strict=True)]
+        pairs = ([f"{axis.name} {value}" for axis, value in zip(axes, place, strict=True)] for place in said)
+        return [(_words(name, fails), pair) for fails, pair in zip(said.values(), pairs, strict=True)]
 
 
 def _joined(places: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -236,7 +238,7 @@ def _joined(places: Sequence[Sequence[str]]) -> Iterator[str]:
         yield from map(", ".join, places)
         return
     name = places[0][0].partition(" ")[0]
-    values = [each.removeprefix(f"{name} ") for (each,) in places]
+    values = [text.removeprefix(f"{name} ") for (text,) in places]
     yield f"{name} {', '.join(values if len(values) < 4 else [_stretch(values)])}"
 
 
@@ -260,12 +262,12 @@ def _words(name: str, fails: Mapping[str, bool]) -> tuple[str, str]:
             runs[-1].append(texts[at])
         else:
             runs.append([texts[at]])
-    shown = [_stretch(each) for each in runs]
+    shown = [_stretch(run) for run in runs]
     more = f" and {len(shown) - SCATTERED} more" if len(shown) > SCATTERED else ""
     return f"fails for {name} {', '.join(shown[:SCATTERED])}{more}", ""
 
 
-def _cell(tally: Tally | None, width: int, colours: bool) -> str:
+def _cell(tally: CaseTally | None, width: int, colours: bool) -> str:
     text = f"{'' if tally is None else tally.percent:>{width}}"
     if tally is None or not colours:
         return text

@@ -21,11 +21,11 @@ from multidrop.base.files import why
 from multidrop.base.text import counted
 from multidrop.features.sweeps import Sweep, workers
 from multidrop.features.sweeps import plan as planning
-from multidrop.features.sweeps.answers import Answer
-from multidrop.features.sweeps.failures import Group, command, grouped, rows
-from multidrop.features.sweeps.plan import Asked, Plan
-from multidrop.features.sweeps.results import Table
-from multidrop.features.sweeps.trial import Case, Result, bench
+from multidrop.features.sweeps.answers import SweepAnswer
+from multidrop.features.sweeps.failures import FailureGroup, command, grouped, rows
+from multidrop.features.sweeps.plan import SweepArguments, SweepPlan
+from multidrop.features.sweeps.results import ResultTable
+from multidrop.features.sweeps.trial import Case, TrialResult, bench
 from multidrop.features.sweeps.variation import SEED, spelled
 from multidrop.shell import configuration
 from multidrop.shell.batch.report import Case as JUnitCase
@@ -36,7 +36,7 @@ from multidrop.shell.streams.stdout import StatusLine, fail, write
 
 
 def run(file: str, sweep: Sweep) -> int:
-    asked = Asked(
+    asked = SweepArguments(
         file,
         sweep.cell,
         sweep.language,
@@ -50,13 +50,13 @@ def run(file: str, sweep: Sweep) -> int:
     )
     plan = planning.make(asked)
     if sweep.svg:
-        if sweep.search or sum(each.count > 1 for each in plan.values) < 2:
+        if sweep.search or sum(value.count > 1 for value in plan.values) < 2:
             raise Diagnostic("shows two keys with several values each", f"--svg {sweep.svg}", "vary a second key")
         check_place(sweep.svg, "--svg", b"<svg", "picture")
     if sweep.junit:  # before the tables are made
         check_place(sweep.junit, "--junit", b"<testsuite", "JUnit report")
-    table = Table(plan, sweep.csv, sweep.parquet, sweep.resume)
-    report = Report(plan, table, as_json=sweep.json, junit=sweep.junit, svg=sweep.svg)
+    table = ResultTable(plan, sweep.csv, sweep.parquet, sweep.resume)
+    report = SweepReport(plan, table, as_json=sweep.json, junit=sweep.junit, svg=sweep.svg)
     with Interruption() as interruption:
         try:
             if sweep.cluster:
@@ -97,16 +97,16 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
 
 
 FAILED = 1
-PERIOD = 0.1
+PROGRESS_PERIOD = 0.1
 """The shortest time between two reports of progress, s."""
 SEARCH, LATE_SEARCH = 10.0, 1.0
 """The time in which simpler worlds are looked for, s; and after an early end."""
 
 
-class Report:
+class SweepReport:
     """The reports of one sweep. Raises Diagnostic for a JUnit file that cannot be written."""
 
-    def __init__(self, plan: Plan, table: Table, *, as_json: bool, junit: str, svg: str) -> None:
+    def __init__(self, plan: SweepPlan, table: ResultTable, *, as_json: bool, junit: str, svg: str) -> None:
         self._plan, self._table, self._json, self._svg = plan, table, as_json, svg
         self._begun, self._began = datetime.now().astimezone(), time.perf_counter()
         self._junit = JUnitFile(junit, plan.asked.file, self._begun)
@@ -120,7 +120,7 @@ class Report:
         """The sweep ended early; `finish` knows."""
         self._said: set[str] = set()
         self._reported: list[int] = []
-        self._failed: dict[int, Result] = {}
+        self._failed: dict[int, TrialResult] = {}
         if table.known:
             write(sys.stderr, f"{counted(len(table.known), 'case')} of {plan.count} are in the file already")
         if not as_json:
@@ -137,12 +137,12 @@ class Report:
             self._report_ready()
             yield [number for number in numbers if number not in self._results]
 
-    def take_all(self, results: Iterator[list[Result]]) -> None:
+    def take_all(self, results: Iterator[list[TrialResult]]) -> None:
         """Take results as they come; report each once all before it are done."""
         for chunk in results:
-            for each in chunk:
-                self._results[each.number] = each
-                self._table.take(each)
+            for result in chunk:
+                self._results[result.number] = result
+                self._table.take(result)
             self._report_ready()
             self._table.save()
             self._progress()
@@ -151,7 +151,7 @@ class Report:
         while self._awaited and self._awaited[0] in self._results:
             self._take(self._results[self._awaited.popleft()])
 
-    def _take(self, result: Result) -> None:
+    def _take(self, result: TrialResult) -> None:
         self._reported.append(result.number)
         if not result.ok:
             self._failed[result.number] = result
@@ -163,11 +163,11 @@ class Report:
     def _progress(self) -> None:
         now = time.perf_counter()
         done, count, new = len(self._results), self._plan.runs, len(self._results) - len(self._table.known)
-        if now - self._shown_at < PERIOD or done >= count:
+        if now - self._shown_at < PROGRESS_PERIOD or done >= count:
             return
         self._shown_at = now
         left = (now - self._began) / max(new, 1) * (count - done)
-        failed = sum(not each.ok for each in self._results.values())
+        failed = sum(not result.ok for result in self._results.values())
         self._status.show(f"{done} of {counted(count, 'case')}, {failed} failed, {_time(left)} left")
 
     def erase(self) -> None:
@@ -210,11 +210,11 @@ class Report:
             write(sys.stderr, "interrupted while simpler worlds were looked for")
         return self._finish_junit(groups, seconds, code or (FAILED if self._failed else 0))
 
-    def _answer(self) -> Answer:
+    def _answer(self) -> SweepAnswer:
         reported = {number: self._results[number] for number in self._reported}
-        return Answer(self._plan, reported, self._plan.asked.search)
+        return SweepAnswer(self._plan, reported, self._plan.asked.search)
 
-    def _kept(self, answer: Answer | None, code: int) -> int:
+    def _kept(self, answer: SweepAnswer | None, code: int) -> int:
         """Write the table and the picture; return the exit code."""
         try:
             self._table.save(now=True)
@@ -233,11 +233,11 @@ class Report:
     def _counted(self) -> str:
         return counted(len(self._reported), "case")
 
-    def _groups(self, interruption: Interruption, seconds: float) -> list[Group]:
+    def _groups(self, interruption: Interruption, seconds: float) -> list[FailureGroup]:
         """Put failures into groups; look for simpler worlds in this time, until there is a signal."""
         ready, until = bench(self._plan.job), time.perf_counter() + seconds
 
-        def run(case: Case) -> Result | None:
+        def run(case: Case) -> TrialResult | None:
             if time.perf_counter() > until:
                 return None
             self._status.show(f"{len(self._failed)} of {self._counted} failed; looking for the simplest worlds")
@@ -249,7 +249,7 @@ class Report:
 
         return grouped(self._plan, self._failed.values(), run)
 
-    def _finish_junit(self, groups: Sequence[Group], seconds: float, code: int) -> int:
+    def _finish_junit(self, groups: Sequence[FailureGroup], seconds: float, code: int) -> int:
         if not self._junit.wanted:
             return code
         commands = {

@@ -14,31 +14,31 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from multidrop.base.text import counted
-from multidrop.features.sweeps.plan import Plan
-from multidrop.features.sweeps.trial import DIED, Case, Result
-from multidrop.features.sweeps.variation import SEED, Value, Values, simpler, spelled
+from multidrop.features.sweeps.plan import SweepPlan
+from multidrop.features.sweeps.trial import DIED, Case, TrialResult
+from multidrop.features.sweeps.variation import SEED, KeyValues, Value, simpler, spelled
 
 RUNS = 60
 """The largest number of runs for one case."""
 World = tuple[Value | None, ...]
 """A value for each key; None is the cell's own."""
-Run = Callable[[Case], Result | None]
+Run = Callable[[Case], TrialResult | None]
 """Runs a case; None: no further run, and the search ends."""
 
 
-def shrunk(case: Case, failed: int, values: Sequence[Values], own: Sequence[Value | None], run: Run) -> World:
+def shrunk(case: Case, failed: int, values: Sequence[KeyValues], own: Sequence[Value | None], run: Run) -> World:
     """Find the simplest world. `own` are the cell's values."""
-    search = _Search(case, failed, run)
+    search = _FailureSearch(case, failed, run)
     for index in range(len(values)):
         search.tries(index, None)
-    for index, (each, origin) in enumerate(zip(values, own, strict=True)):
+    for index, (key_values, origin) in enumerate(zip(values, own, strict=True)):
         value = search.world[index]
         if value is not None:
-            search.nearest(index, simpler(each, value, origin))
+            search.nearest(index, simpler(key_values, value, origin))
     return search.world
 
 
-class _Search:
+class _FailureSearch:
     def __init__(self, case: Case, failed: int, run: Run) -> None:
         self._number, values = case
         self.world: World = tuple(values)
@@ -71,14 +71,14 @@ class _Search:
                 passes = middle
 
 
-MOST = 20
+MOST_GROUPS = 20
 """The largest number of groups whose simplest world is looked for."""
 WIDTH = 50
 """The largest width of the column of what was seen."""
 
 
 @dataclass
-class Group:
+class FailureGroup:
     """Cases that fail alike in one simplest world."""
 
     failed: int
@@ -86,26 +86,26 @@ class Group:
     world: World
     numbers: list[int] = field(default_factory=list)
 
-    def explains(self, case: Case, result: Result) -> bool:
+    def explains(self, case: Case, result: TrialResult) -> bool:
         """Whether a case has the simplest world among its values, and failed alike."""
         pairs = zip(self.world, case[1], strict=True)
         return result.failed == self.failed and all(small is None or small == value for small, value in pairs)
 
 
-def grouped(plan: Plan, failures: Iterable[Result], run: Run) -> list[Group]:
-    """Put failures into groups, MOST at most. `run` runs a case in search of a simpler world."""
-    groups: list[Group] = []
+def grouped(plan: SweepPlan, failures: Iterable[TrialResult], run: Run) -> list[FailureGroup]:
+    """Put failures into groups, MOST_GROUPS at most. `run` runs a case in search of a simpler world."""
+    groups: list[FailureGroup] = []
     for result in failures:
         case = plan.case(result.number)
         group = next((each for each in groups if each.explains(case, result)), None)
-        if group is None and len(groups) < MOST:
+        if group is None and len(groups) < MOST_GROUPS:
             group = _simplest(plan, case, result, run, groups)
         if group is not None:
             group.numbers.append(result.number)
     return groups
 
 
-def _simplest(plan: Plan, case: Case, result: Result, run: Run, groups: list[Group]) -> Group:
+def _simplest(plan: SweepPlan, case: Case, result: TrialResult, run: Run, groups: list[FailureGroup]) -> FailureGroup:
     """Find the group of the simplest world of a failure; add it where it is a new one."""
     own = [key.own(plan.drive) for key in plan.job.keys]
     world: World = tuple(
@@ -113,14 +113,14 @@ def _simplest(plan: Plan, case: Case, result: Result, run: Run, groups: list[Gro
     )  # no condition of a program test depends on the seed
     if result.failed != DIED:  # it would end this process, too
         world = shrunk((case[0], world), result.failed, plan.values, own, run)
-    found = next((each for each in groups if (each.failed, each.world) == (result.failed, world)), None)
-    if found is None:
-        found = Group(result.failed, result.why, world)
-        groups.append(found)
-    return found
+    group = next((each for each in groups if (each.failed, each.world) == (result.failed, world)), None)
+    if group is None:
+        group = FailureGroup(result.failed, result.why, world)
+        groups.append(group)
+    return group
 
 
-def command(plan: Plan, world: World, failed: int) -> str:
+def command(plan: SweepPlan, world: World, failed: int) -> str:
     """The shortest command line that repeats a failure, quoted for a shell."""
     asked = plan.asked
     words = ["multidrop", "program", "sweep", asked.file]
@@ -134,7 +134,7 @@ def command(plan: Plan, world: World, failed: int) -> str:
     return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
-def rows(plan: Plan, groups: Sequence[Group], failed: int) -> Iterator[str]:
+def rows(plan: SweepPlan, groups: Sequence[FailureGroup], failed: int) -> Iterator[str]:
     """The lines of the table of groups. `failed`: the number of all failed cases."""
     table = [("cases", "first", "seen", "simplest world that fails so")]
     for each in groups:

@@ -17,15 +17,15 @@ from pathlib import Path
 from random import Random
 
 from multidrop.base.errors import Diagnostic
-from multidrop.features.sweeps.trial import Case, Job, Result, bench, version
+from multidrop.features.sweeps.trial import Case, TrialJob, TrialResult, bench, version
 from multidrop.features.sweeps.variation import (
     DRIVE,
     OWN_KEYS,
     SEED,
     Drive,
-    Key,
+    KeyValues,
     Value,
-    Values,
+    VariedKey,
     misplaced_hint,
     parse_key,
     parse_values,
@@ -34,18 +34,18 @@ from multidrop.features.sweeps.variation import (
 from multidrop.shell import configuration
 from multidrop.shell.programs.checking import to_run
 from multidrop.simulator import cells
-from multidrop.simulator.cells import Placed
+from multidrop.simulator.cells import CellDrive
 from multidrop.simulator.families import PROGRAMS
 from multidrop.simulator.torque import MOTORS
 
-MOST = 100_000
+MOST_CASES = 100_000
 """The largest number of cases."""
 EXPECTED = ("errors == []",)
 """The condition where none is given."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class SweepArguments:
     """The arguments of a sweep. `cell` None: a drive in empty surroundings. `draws` None: all cases of the grid."""
 
     file: str
@@ -62,23 +62,23 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Plan:
+class SweepPlan:
     """A checked sweep. `place` is what `--cell` needs to name the drive; empty: no cell is given."""
 
-    asked: Asked
-    job: Job
+    asked: SweepArguments
+    job: TrialJob
     place: str
-    values: tuple[Values, ...]
+    values: tuple[KeyValues, ...]
     drive: Drive
 
     @property
     def count(self) -> int:
-        return prod(each.count for each in self.values) if self.asked.draws is None else self.asked.draws
+        return prod(value.count for value in self.values) if self.asked.draws is None else self.asked.draws
 
     @cached_property
     def _drawn(self) -> list[tuple[Value, ...]]:
         rng = Random(self.asked.seed)
-        return [tuple(each.draw(rng) for each in self.values) for _ in range(self.asked.draws or 0)]
+        return [tuple(value.draw(rng) for value in self.values) for _ in range(self.asked.draws or 0)]
 
     def case(self, number: int) -> Case:
         return number, self.values_of(number)
@@ -87,13 +87,13 @@ class Plan:
         """The values of a case."""
         if self.asked.draws is not None:
             return self._drawn[number - 1]
-        index, found = number - 1, []
-        for each in reversed(self.values):
-            index, rest = divmod(index, each.count)
-            found.append(each.at(rest))
-        return tuple(reversed(found))
+        index, numbers = number - 1, []
+        for value in reversed(self.values):
+            index, rest = divmod(index, value.count)
+            numbers.append(value.at(rest))
+        return tuple(reversed(numbers))
 
-    def rounds(self, results: Mapping[int, Result]) -> Iterator[Sequence[int]]:
+    def rounds(self, results: Mapping[int, TrialResult]) -> Iterator[Sequence[int]]:
         """Yield the numbers of the cases to run, in rounds; `results` has those of a round before the next is taken.
 
         A search runs the ends of its key in each world, and halves the interval of each whose ends differ.
@@ -102,7 +102,7 @@ class Plan:
             yield range(1, self.count + 1)
             return
         at = [key.text for key in self.job.keys].index(self.asked.search)
-        count, stride = self.values[at].count, prod(each.count for each in self.values[at + 1 :])
+        count, stride = self.values[at].count, prod(value.count for value in self.values[at + 1 :])
         worlds = [
             1 + high * stride * count + low for high in range(self.count // stride // count) for low in range(stride)
         ]
@@ -126,7 +126,7 @@ class Plan:
         return self.count // self.searched.count * (1 + self.searched.count.bit_length())
 
     @property
-    def searched(self) -> Values:
+    def searched(self) -> KeyValues:
         """The values of the key whose boundary is searched."""
         return next(v for k, v in zip(self.job.keys, self.values, strict=True) if k.text == self.asked.search)
 
@@ -134,7 +134,7 @@ class Plan:
         """What makes this sweep the same as another: equal facts, equal results."""
         drawn = f"{self.asked.draws} draws" if self.asked.draws is not None else ""
         until = "" if self.job.until is None else f"until {self.job.until:.15g}"
-        found = {
+        facts = {
             "seed": str(self.asked.seed),
             "multidrop": version(),
             "python": platform.python_version(),
@@ -143,21 +143,21 @@ class Plan:
             "vary": " ".join(filter(None, [*(shlex.quote(f"{key}={text}") for key, text in self.asked.vary), drawn])),
             "expect": "; ".join(filter(None, [*self.job.expects, self.job.run and f"run {self.job.run}", until])),
         }
-        return {name: text for name, text in found.items() if name not in (key.text for key in self.job.keys)}
+        return {name: text for name, text in facts.items() if name not in (key.text for key in self.job.keys)}
 
     def settings(self, case: Case) -> dict[str, Value]:
         """The values of a case by their keys, as they are written; the cell's own ones are left out."""
         return {key.text: value for key, value in zip(self.job.keys, case[1], strict=True) if value is not None}
 
 
-def make(asked: Asked) -> Plan:
+def make(asked: SweepArguments) -> SweepPlan:
     """Read the files and check everything, before anything runs. Raises Diagnostic."""
     program, language = to_run(asked.file, asked.language)
     default = PROGRAMS[language].drive
     allow = configuration.load().allowed if asked.cell else ()
-    bare = Placed("", "", default, {"personality": default.personality, "name": default.name})
+    bare = CellDrive("", "", default, {"personality": default.personality, "name": default.name})
     everyone = [bare] if asked.cell is None else cells.matching(asked.cell.partition("#")[0], allow)
-    names = {name: each for each in everyone for name in _names(each)}
+    names = {name: candidate for candidate in everyone for name in _names(candidate)}
     parsed = [(*_parsed(key, names), _values(key, text, asked)) for key, text in asked.vary]
     chosen = bare if asked.cell is None else _chosen(asked.cell, allow, {drive for drive, _, _ in parsed} - {""})
     keys = tuple(key for _, key, _ in parsed)
@@ -172,21 +172,21 @@ def make(asked: Asked) -> Plan:
             name = names[named].spec.name
             what = f"drive {chosen.spec.name} runs the program, so drive {name} changes nothing"
             raise Diagnostic(what, f"--vary {key.text}", f"--cell {names[named].place} lets drive {name} run it")
-    drive = {name: each for name, each in chosen.table.items() if name not in OWN_KEYS}
+    drive = {name: value for name, value in chosen.table.items() if name not in OWN_KEYS}
     expects = tuple(asked.expect) or EXPECTED
     where = f"drive {chosen.spec.name}"
-    job = Job(
+    job = TrialJob(
         asked.file, program, language, json.dumps(drive), where, keys, expects, asked.run, asked.until, chosen.own_units
     )
     place = asked.cell or ""
     if asked.cell is not None and len(cells.matching(asked.cell, allow)) != 1:
         place = chosen.place
-    made = Plan(asked, job, place, tuple(each for _, _, each in parsed), drive)
+    made = SweepPlan(asked, job, place, tuple(values for _, _, values in parsed), drive)
     _check(made)
     return made
 
 
-def _parsed(text: str, names: Collection[str]) -> tuple[str, Key]:
+def _parsed(text: str, names: Collection[str]) -> tuple[str, VariedKey]:
     try:
         return parse_key(text, names)
     except Diagnostic as problem:
@@ -194,7 +194,7 @@ def _parsed(text: str, names: Collection[str]) -> tuple[str, Key]:
         raise Diagnostic(problem.message, problem.where, hint) from None
 
 
-def _values(key: str, text: str, asked: Asked) -> Values:
+def _values(key: str, text: str, asked: SweepArguments) -> KeyValues:
     try:
         return parse_values(text, drawn=asked.draws is not None)
     except Diagnostic as problem:
@@ -205,32 +205,32 @@ def _digest(*parts: object) -> str:
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
 
-def _names(drive: Placed) -> tuple[str, ...]:
+def _names(drive: CellDrive) -> tuple[str, ...]:
     name = drive.spec.name
     return (name, f"{drive.bus}:{name}") if drive.bus else (name,)
 
 
-def _chosen(cell: str, allow: Sequence[Path], named: set[str]) -> Placed:
+def _chosen(cell: str, allow: Sequence[Path], named: set[str]) -> CellDrive:
     """The drive that runs the program: the only one, or else the only one that a key names. Raises Diagnostic."""
     candidates = cells.matching(cell, allow)
-    chosen = [each for each in candidates if named.intersection(_names(each))]
+    chosen = [candidate for candidate in candidates if named.intersection(_names(candidate))]
     return chosen[0] if len(candidates) > 1 and len(chosen) == 1 else cells.placed(cell, allow)
 
 
-def _check(plan: Plan) -> None:
+def _check(plan: SweepPlan) -> None:
     """Refuse too many cases, and any value that the world or the drive refuses. Raises Diagnostic."""
     if plan.asked.search and plan.asked.search not in (key.text for key in plan.job.keys):
         raise Diagnostic("has no values", f"--search {plan.asked.search}", f"--vary {plan.asked.search}=A..B:STEP")
     if plan.asked.search:
-        numbers = [each for each in plan.searched.samples() if isinstance(each, int | float)]
+        numbers = [sample for sample in plan.searched.samples() if isinstance(sample, int | float)]
         if numbers not in (sorted(numbers), sorted(numbers, reverse=True)):
             raise Diagnostic("its values go up and down", f"--search {plan.asked.search}", "write them in order")
-    if plan.runs > MOST:
+    if plan.runs > MOST_CASES:
         hint = "take larger steps or fewer values, or draw some with --random N"
-        raise Diagnostic(f"{plan.runs} cases are too many; a sweep has {MOST} at most", "--vary", hint)
+        raise Diagnostic(f"{plan.runs} cases are too many; a sweep has {MOST_CASES} at most", "--vary", hint)
     bench(plan.job)
-    for index, (key, each) in enumerate(zip(plan.job.keys, plan.values, strict=True)):
-        for value in each.samples():
+    for index, (key, values) in enumerate(zip(plan.job.keys, plan.values, strict=True)):
+        for value in values.samples():
             try:
                 _check_value(plan, index, key, value)
             except Diagnostic as problem:
@@ -239,7 +239,7 @@ def _check(plan: Plan) -> None:
                 raise Diagnostic(f"{problem.where}: {problem.message}", where, hint) from None
 
 
-def _check_value(plan: Plan, index: int, key: Key, value: Value) -> None:
+def _check_value(plan: SweepPlan, index: int, key: VariedKey, value: Value) -> None:
     """Refuse a value that the drive refuses beside its own ones, and beside the first and last of the other keys."""
     if key.part == SEED:
         if not isinstance(value, int):
@@ -252,7 +252,7 @@ def _check_value(plan: Plan, index: int, key: Key, value: Value) -> None:
     refusals = []
     for at in (0, 1, -1):
         try:
-            ready.loaded([value if n == index else each[at] for n, each in enumerate(others)])
+            ready.loaded([value if n == index else pick[at] for n, pick in enumerate(others)])
             return
         except Diagnostic as problem:
             refusals.append(problem)

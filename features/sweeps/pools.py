@@ -21,13 +21,13 @@ from typing import ParamSpec, TypeVar
 
 from multidrop.base.files import why
 from multidrop.features.sweeps import trial
-from multidrop.features.sweeps.trial import DIED, Case, Job, Result
+from multidrop.features.sweeps.trial import DIED, Case, TrialJob, TrialResult
 from multidrop.shell.signals import FROM_TERMINAL, SIGNALS, Interruption
 from multidrop.shell.streams.stdout import WATCHER
 
-AHEAD = 3
+CHUNKS_AHEAD = 3
 """Chunks for each process that are submitted and not done."""
-Run = Callable[[Job, Sequence[Case]], list[Result]]
+Run = Callable[[TrialJob, Sequence[Case]], list[TrialResult]]
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -36,7 +36,12 @@ class Pools:
     """Pools of processes, one after the other: one in which a process dies is at its end."""
 
     def __init__(
-        self, job: Job, jobs: int, interruption: Interruption, run: Run, say: Callable[[str], None] = lambda text: None
+        self,
+        job: TrialJob,
+        jobs: int,
+        interruption: Interruption,
+        run: Run,
+        say: Callable[[str], None] = lambda text: None,
     ) -> None:
         """`say` takes one line for a person where no process can begin."""
         self._job, self._jobs, self._interruption, self._run, self._say = job, jobs, interruption, run, say
@@ -48,7 +53,7 @@ class Pools:
         self._possible = True
         """Whether processes can begin at all; otherwise this one runs the cases."""
 
-    def results(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
+    def results(self, todo: Iterator[list[Case]]) -> Iterator[list[TrialResult]]:
         if not self._can_begin():
             for case in (case for cases in todo for case in cases):
                 yield self._here(case)
@@ -75,8 +80,8 @@ class Pools:
         self._possible = False
         self._say(f"no other process can be started ({reason}), so all cases run in this one, which takes longer")
 
-    def _in_a_pool(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
-        running: dict[Future[list[Result]], list[Case]] = {}
+    def _in_a_pool(self, todo: Iterator[list[Case]]) -> Iterator[list[TrialResult]]:
+        running: dict[Future[list[TrialResult]], list[Case]] = {}
         with self._pool(self._jobs) as pool:
             self._submit(pool, todo, running)
             while running:
@@ -85,17 +90,20 @@ class Pools:
                     if isinstance(future.exception(), BrokenProcessPool):
                         self._suspects += cases
                     else:
-                        found = future.result()
-                        self._rests += [cases[len(found) :]] if len(found) < len(cases) else []
-                        yield found
+                        results = future.result()
+                        self._rests += [cases[len(results) :]] if len(results) < len(cases) else []
+                        yield results
                 if self._interruption.came:
                     raise KeyboardInterrupt
                 self._submit(pool, todo, running)
 
     def _submit(
-        self, pool: ProcessPoolExecutor, todo: Iterator[list[Case]], running: dict[Future[list[Result]], list[Case]]
+        self,
+        pool: ProcessPoolExecutor,
+        todo: Iterator[list[Case]],
+        running: dict[Future[list[TrialResult]], list[Case]],
     ) -> None:
-        while len(running) < self._jobs * AHEAD and not self._suspects:
+        while len(running) < self._jobs * CHUNKS_AHEAD and not self._suspects:
             cases = self._rests.pop() if self._rests else next(todo, None)
             if cases is None:
                 return
@@ -105,14 +113,14 @@ class Pools:
             except (BrokenProcessPool, OSError):  # OSError: too many processes, or no memory for one more
                 self._suspects += cases
 
-    def _done(self, running: Iterable[Future[list[Result]]]) -> set[Future[list[Result]]]:
+    def _done(self, running: Iterable[Future[list[TrialResult]]]) -> set[Future[list[TrialResult]]]:
         try:
             with self._interruption.open():
                 return wait(running, return_when=FIRST_COMPLETED).done
         except KeyboardInterrupt:
-            return {each for each in running if each.done()}
+            return {future for future in running if future.done()}
 
-    def _alone(self, case: Case) -> list[Result]:
+    def _alone(self, case: Case) -> list[TrialResult]:
         """Run a case in a process of its own, if one begins."""
         with self._pool(1) as pool:
             try:
@@ -123,7 +131,7 @@ class Pools:
             try:
                 return self._outcome(pool, self._run, self._job, [case])
             except BrokenProcessPool:
-                return [Result(case[0], DIED, "the process that ran it died: killed, or out of memory")]
+                return [TrialResult(case[0], DIED, "the process that ran it died: killed, or out of memory")]
 
     def _outcome(self, pool: ProcessPoolExecutor, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         with _signals_blocked():
@@ -132,7 +140,7 @@ class Pools:
             wait([future])
         return future.result()
 
-    def _here(self, case: Case) -> list[Result]:
+    def _here(self, case: Case) -> list[TrialResult]:
         with self._interruption.open():
             return self._run(self._job, [case])
 
@@ -143,9 +151,9 @@ class Pools:
         try:
             yield pool
         except BaseException:
-            for each in multiprocessing.active_children():
-                if each not in before:
-                    each.terminate()
+            for child in multiprocessing.active_children():
+                if child not in before:
+                    child.terminate()
             raise
         finally:
             pool.shutdown(cancel_futures=True)
@@ -153,7 +161,7 @@ class Pools:
 
 def _context() -> BaseContext:
     """The way processes begin: as forks of this one, unless it has threads, whose locks a fork would copy."""
-    others = [each for each in threading.enumerate() if each.name != WATCHER]
+    others = [thread for thread in threading.enumerate() if thread.name != WATCHER]
     if sys.platform != "linux" or len(others) > 1:
         if "forkserver" not in multiprocessing.get_all_start_methods():
             return multiprocessing.get_context("spawn")

@@ -23,13 +23,13 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import bytes_of, utf8, why
 from multidrop.base.parquet import pyarrow
 from multidrop.base.text import cell, counted, of_cell, whole
-from multidrop.features.sweeps.plan import Plan
-from multidrop.features.sweeps.trial import CUT, DIED, HELD, MARGIN, REFUSED, Result, bench
+from multidrop.features.sweeps.plan import SweepPlan
+from multidrop.features.sweeps.trial import ALL_HELD, CUT, DIED, MARGIN, REFUSED, TrialResult, bench
 from multidrop.features.sweeps.variation import spelled
 
-LARGEST = 1 << 30
+LARGEST_FILE = 1 << 30
 """The largest file that is read, bytes."""
-PERIOD, SHARE = 1.0, 20
+LEAST_WRITE_PERIOD, SHARE = 1.0, 20
 """The shortest time between two writes, s; and that time as a multiple of what a write takes."""
 PARQUET = ".parquet"
 MAGIC = b"PAR1"
@@ -38,10 +38,10 @@ REASONS = {CUT: "still running", REFUSED: "refused", DIED: "died"}
 """The texts in place of a failed condition."""
 
 
-class Table:
+class ResultTable:
     """The rows of a sweep, and the files that they are written to."""
 
-    def __init__(self, plan: Plan, csv_file: str = "", parquet: str = "", resume: str = "") -> None:
+    def __init__(self, plan: SweepPlan, csv_file: str = "", parquet: str = "", resume: str = "") -> None:
         """Read and check the files; make those that do not exist. Raises Diagnostic, and changes no other file then."""
         self._plan, self._facts = plan, plan.facts()
         self._reasons = dict(enumerate(plan.job.expects)) | REASONS
@@ -51,7 +51,7 @@ class Table:
         self._rows: dict[int, bytes] = {}
         self._cells: dict[int, bytes] = {}
         """The rows as a CSV file has them: no cell is a formula."""
-        self.known: dict[int, Result] = {}
+        self.known: dict[int, TrialResult] = {}
         """The results that the file to resume has."""
         if csv_file and csv_file == parquet:
             raise Diagnostic("is the CSV file already", f"--parquet {parquet}", "name another file")
@@ -81,14 +81,14 @@ class Table:
         new_file.check_folder(file)
         if not os.path.exists(file):
             return
-        found = self._read(file)
+        kept = self._read(file)
         if file == resume:
-            self.known = found
-        elif 0 < len(found) < self._plan.count:
-            what = f"has {len(found)} of {counted(self._plan.count, 'case')} of this sweep already"
+            self.known = kept
+        elif 0 < len(kept) < self._plan.count:
+            what = f"has {len(kept)} of {counted(self._plan.count, 'case')} of this sweep already"
             raise Diagnostic(what, file, f"--resume {file} goes on with them")
 
-    def take(self, result: Result) -> None:
+    def take(self, result: TrialResult) -> None:
         if self._files:
             values = self._values(result.number)
             failed = self._reasons.get(result.failed, "")
@@ -106,7 +106,7 @@ class Table:
         if self._files and (now or begin >= self._next):
             self._write(self._files)
             end = time.monotonic()
-            self._next = end + max(PERIOD, SHARE * (end - begin))
+            self._next = end + max(LEAST_WRITE_PERIOD, SHARE * (end - begin))
 
     def _write(self, files: Iterable[str]) -> None:
         for file in files:
@@ -128,25 +128,25 @@ class Table:
         pa.parquet.write_table(table, out)
         return out.getvalue()
 
-    def _read(self, file: str) -> dict[int, Result]:
+    def _read(self, file: str) -> dict[int, TrialResult]:
         """The results in a file. Raises Diagnostic for one that is not of this sweep."""
-        found = {}
+        results = {}
         try:
             rows = csv.reader(io.StringIO(_text(file), newline=""), strict=True)
             head = next(rows, [])
             if head[:1] != ["case"] or not {"ok", "failed", "why", "vary"} <= {*head}:
                 raise _strange(file)
-            for row in (list(map(of_cell, each)) for each in rows):
+            for row in (list(map(of_cell, cells)) for cells in rows):
                 if len(row) != len(head):
                     raise Diagnostic("is not a whole row", f"{file}:{rows.line_num}", "remove it, or name a new file")
                 self._check_facts(file, dict(zip(head, row, strict=True)))
                 result = self._result(row) if head == self._columns else None
                 if result is None:
                     raise Diagnostic("is not a row of this sweep", f"{file}:{rows.line_num}", "name a new file")
-                found[result.number] = result
+                results[result.number] = result
         except csv.Error:
             raise _strange(file) from None
-        return found
+        return results
 
     def _check_facts(self, file: str, row: Mapping[str, str]) -> None:
         for name, ours in self._facts.items():
@@ -154,19 +154,19 @@ class Table:
                 what = "is another one" if name in ("program", "cell") else f"is {theirs!r}, and here it is {ours!r}"
                 raise Diagnostic(f"is of another sweep: its {name} {what}", file, "name a new file")
 
-    def _result(self, row: Sequence[str]) -> Result | None:
+    def _result(self, row: Sequence[str]) -> TrialResult | None:
         """The result in a row; None if the row is none of this sweep."""
-        codes = {text: code for code, text in reversed([*self._reasons.items()])} | {"": HELD}
+        codes = {text: code for code, text in reversed([*self._reasons.items()])} | {"": ALL_HELD}
         ok, failed, said = row[self._kept.start - 3 : self._kept.start]
         number, code, cells = whole(row[0], 1, self._plan.count), codes.get(failed), tuple(row[self._kept])
-        for name, each in zip(self._columns[self._kept], cells, strict=True):
-            if name.startswith(MARGIN) and each and not _NUMBER.fullmatch(each):
+        for name, of_column in zip(self._columns[self._kept], cells, strict=True):
+            if name.startswith(MARGIN) and of_column and not _NUMBER.fullmatch(of_column):
                 return None
-        if number is None or code is None or (ok == "true") != (code == HELD):
+        if number is None or code is None or (ok == "true") != (code == ALL_HELD):
             return None
         if not all(map(_same, row[1:], self._values(number))):
             return None
-        return Result(number, code, said, cells)
+        return TrialResult(number, code, said, cells)
 
 
 def _line(row: Iterable[str]) -> bytes:
@@ -185,7 +185,7 @@ def _same(found: str, value: str) -> bool:
 
 def _text(file: str) -> str:
     """The text of a table. Raises Diagnostic."""
-    data = bytes_of(file, LARGEST)
+    data = bytes_of(file, LARGEST_FILE)
     if data.startswith(MAGIC):
         pa = pyarrow("use a CSV file")
         try:

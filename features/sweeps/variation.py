@@ -24,9 +24,9 @@ from multidrop.simulator.cell.drive_keys import ENCODER_KEYS, WORLD_KEYS
 Value = int | float | str | list[Any]
 FINE = 5
 """Decimals more than the ends of a range have, for draws from a range without a step."""
-LARGEST = 10**15
+MOST_RANGE_VALUES = 10**15
 """The largest number of values in a range."""
-MOST = 2000
+MOST_CHECKED_VALUES = 2000
 """The largest number of listed values that are looked at for a simpler one."""
 _NUMBER = r"[+-]?(?:\d{1,15}(?:\.\d{1,9})?|\.\d{1,9})(?:[eE][+-]?\d)?"
 _NUMERIC = re.compile(_NUMBER, re.ASCII)
@@ -47,7 +47,7 @@ class Single:
 
 
 @dataclass(frozen=True)
-class Steps:
+class ValueRange:
     """The values of a range: `low`, `low + step` and so on, `count` of them, each with the unit if there is one."""
 
     low: Decimal
@@ -68,18 +68,18 @@ class Steps:
         return min(max(index, 0), self.count - 1)
 
 
-Piece = Single | Steps
+Piece = Single | ValueRange
 
 
 @dataclass(frozen=True)
-class Values:
+class KeyValues:
     """The values of one key, in the order in which they are written."""
 
     pieces: tuple[Piece, ...]
 
     @property
     def count(self) -> int:
-        return sum(each.count for each in self.pieces)
+        return sum(piece.count for piece in self.pieces)
 
     def at(self, index: int) -> Value:
         for piece in self.pieces:
@@ -98,9 +98,9 @@ class Values:
                 yield piece.at(piece.count - 1)
 
 
-def parse_values(text: str, *, drawn: bool = False) -> Values:
+def parse_values(text: str, *, drawn: bool = False) -> KeyValues:
     """Parse values. `drawn`: a range of fractions without a step has fine ones. Raises Diagnostic."""
-    return Values(tuple(_piece(item, drawn) for item in _items(text)))
+    return KeyValues(tuple(_piece(item, drawn) for item in _items(text)))
 
 
 def spelled(value: Value) -> str:
@@ -143,7 +143,7 @@ def _piece(item: str, drawn: bool) -> Piece:
     return _steps(item, Decimal(low), Decimal(high), Decimal(step) if step else None, drawn, unit or "")
 
 
-def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: bool, unit: str) -> Steps:
+def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: bool, unit: str) -> ValueRange:
     places = max(0, -int(low.as_tuple().exponent), -int(high.as_tuple().exponent))
     if step is None:
         if places and not drawn and high - low < 1:
@@ -152,11 +152,13 @@ def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: 
     if not step:
         raise Diagnostic(f"{item} has a step of 0", hint=_VALID)
     count = int((high - low) / step) + 1 if (high - low) / step >= 0 else 0
-    if count > LARGEST:
-        raise Diagnostic(f"{item} has too many values", hint=f"valid: up to {LARGEST:.0e}, with a larger step")
+    if count > MOST_RANGE_VALUES:
+        raise Diagnostic(
+            f"{item} has too many values", hint=f"valid: up to {MOST_RANGE_VALUES:.0e}, with a larger step"
+        )
     if not count:
         raise Diagnostic(f"{item} is an empty range", hint="the smaller end comes first, or the step is negative")
-    return Steps(low, step, count, unit)
+    return ValueRange(low, step, count, unit)
 
 
 def _plain(number: Decimal) -> int | float:
@@ -164,28 +166,28 @@ def _plain(number: Decimal) -> int | float:
     return int(number) if number == number.to_integral_value() else float(number)
 
 
-def simpler(values: Values, value: Value, origin: Value | None) -> Sequence[Value]:
+def simpler(values: KeyValues, value: Value, origin: Value | None) -> Sequence[Value]:
     """The values nearer to `origin` than `value` is, nearest first; of texts and lists, those written before it.
 
     `origin` None is 0. Of a range, these are the values between.
     """
     origin = 0 if origin is None else origin
     piece, numbers = values.pieces[0], isinstance(value, int | float) and isinstance(origin, int | float)
-    if len(values.pieces) == 1 and isinstance(piece, Steps) and (piece.unit or numbers):
+    if len(values.pieces) == 1 and isinstance(piece, ValueRange) and (piece.unit or numbers):
         first, last = piece.nearest(origin), piece.nearest(value)
         return _Between(piece, range(first, last, 1 if last > first else -1))
     if not (isinstance(value, int | float) and isinstance(origin, int | float)):
-        listed = [each.value for each in values.pieces if isinstance(each, Single)]
+        listed = [single.value for single in values.pieces if isinstance(single, Single)]
         return listed[: listed.index(value)] if value in listed else []
     far = abs(value - origin)
-    listed = [values.at(index) for index in range(min(values.count, MOST))]
-    near = {abs(each - origin): each for each in listed if isinstance(each, int | float)}
+    listed = [values.at(index) for index in range(min(values.count, MOST_CHECKED_VALUES))]
+    near = {abs(number - origin): number for number in listed if isinstance(number, int | float)}
     return [near[gap] for gap in sorted(near) if gap < far]
 
 
 @dataclass(frozen=True)
 class _Between(Sequence[Value]):
-    piece: Steps
+    piece: ValueRange
     indices: range
 
     def __len__(self) -> int:
@@ -208,7 +210,7 @@ Drive = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Key:
+class VariedKey:
     """A key as it is written, and its place: `world`, `set` or none, the axis, the name in the table; or the seed."""
 
     text: str
@@ -226,8 +228,8 @@ class Key:
         if self.part == SETTINGS:
             return next((value for name, value in table.items() if name.upper() == self.name), None)
         of_axis = _table(table, self.axis or AXES[0])
-        found: Value | None = of_axis.get(self.name)
-        return table.get(self.name) if found is None and self.axis in ("", AXES[0]) else found
+        value: Value | None = of_axis.get(self.name)
+        return table.get(self.name) if value is None and self.axis in ("", AXES[0]) else value
 
     def put(self, drive: Drive, value: Value) -> Drive:
         if self.part == SEED:
@@ -244,10 +246,10 @@ class Key:
         return {**drive, self.part: {**table, **entry}}
 
 
-def parse_key(text: str, names: Container[str]) -> tuple[str, Key]:
+def parse_key(text: str, names: Container[str]) -> tuple[str, VariedKey]:
     """Parse a key; return its drive, empty for none, and the key. `names` are the drives'. Raises Diagnostic."""
     if text == SEED:
-        return "", Key(text, SEED, SEED)
+        return "", VariedKey(text, SEED, SEED)
     drive, dot, rest = text.partition(".")
     if drive not in names:
         if dot and drive.lower() not in AXES:
@@ -259,13 +261,13 @@ def parse_key(text: str, names: Container[str]) -> tuple[str, Key]:
     if not name or (dot and not of_an_axis):
         raise Diagnostic("is not a key", f"--vary {text}", "valid: seed, DRIVE.KEY, or KEY with one drive")
     if name.lower() == MOTOR:
-        return drive, Key(text, DRIVE, MOTOR)
+        return drive, VariedKey(text, DRIVE, MOTOR)
     if axis or _in_world(name):
-        return drive, Key(text, WORLD, name.lower(), axis)
-    return drive, Key(text, SETTINGS, name.upper())
+        return drive, VariedKey(text, WORLD, name.lower(), axis)
+    return drive, VariedKey(text, SETTINGS, name.upper())
 
 
-def misplaced_hint(key: Key) -> str:
+def misplaced_hint(key: VariedKey) -> str:
     """What a refused setting may have meant: a key of the world with a similar name; empty if none has."""
     near = get_close_matches(key.name.lower(), (*WORLD_KEYS, *ENCODER_KEYS), 1, 0.7) if key.part == SETTINGS else ()
     return f"did you mean the world's {near[0]}?" if near else ""
@@ -276,5 +278,5 @@ def _in_world(name: str) -> bool:
 
 
 def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    found: Mapping[str, Any] = table.get(key, {})
-    return found
+    subtable: Mapping[str, Any] = table.get(key, {})
+    return subtable

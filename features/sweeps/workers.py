@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.features.sweeps import trial
-from multidrop.features.sweeps.trial import DIED, Case, Job, Result
+from multidrop.features.sweeps.trial import DIED, Case, TrialJob, TrialResult
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.signals import Interruption
 from multidrop.transports import Unreachable
@@ -32,9 +32,9 @@ CHUNK = 0.075
 """The work of one chunk, s of processor time."""
 WORTH = 0.1
 """The work that is worth further processes, s of processor time."""
-FIRST = 3
+FIRST_CASES = 3
 """The cases that run in this process first; the last of them is the measure."""
-Run = Callable[[Job, Sequence[Case]], list[Result]]
+Run = Callable[[TrialJob, Sequence[Case]], list[TrialResult]]
 
 
 def cores() -> int:
@@ -44,26 +44,26 @@ def cores() -> int:
 
 
 def results(
-    job: Job,
+    job: TrialJob,
     cases: Iterator[Case],
     count: int,
     jobs: int,
     interruption: Interruption,
     run: Run = trial.chunk,
     say: Callable[[str], None] = lambda text: None,
-) -> Iterator[list[Result]]:
+) -> Iterator[list[TrialResult]]:
     """Run `count` cases in `jobs` processes; yield the results of each chunk as it ends.
 
     `say` takes one line for a person where no process can be started, and this one runs all cases.
     """
     seconds = 0.0
-    for case in islice(cases, FIRST):
+    for case in islice(cases, FIRST_CASES):
         begin = time.process_time()
         with interruption.open():
-            found = run(job, [case])
+            results = run(job, [case])
         seconds = time.process_time() - begin
-        yield found
-    work = seconds * (count - FIRST)
+        yield results
+    work = seconds * (count - FIRST_CASES)
     if jobs > 1 and work > WORTH:
         size = max(1, round(min(CHUNK, work / jobs / 8) / max(seconds, 1e-6)))
         from multidrop.features.sweeps.pools import Pools  # 20 ms, which a small sweep is spared
@@ -71,22 +71,22 @@ def results(
         yield from Pools(job, jobs, interruption, run, say).results(chunks(cases, size))
     for case in cases:
         with interruption.open():
-            found = run(job, [case])
-        yield found
+            results = run(job, [case])
+        yield results
 
 
 def chunks(cases: Iterator[Case], size: int) -> Iterator[list[Case]]:
-    while found := list(islice(cases, size)):
-        yield found
+    while cases_of_chunk := list(islice(cases, size)):
+        yield cases_of_chunk
 
 
-PATIENCE = 3.0
+SCHEDULER_TIMEOUT = 3.0
 """Time for the scheduler to reply, s."""
-SILENT = 30.0
+WORKER_TIMEOUT = 30.0
 """The time without a sign of life of any worker after which a cluster is lost, s."""
 STUCK = 600.0
 """The time without a result after which it is, s."""
-LOOK = 3.0
+CHECK_PERIOD = 3.0
 """The time between two looks for signs of life, s."""
 WAIT = 0.1
 TRUST = (
@@ -97,8 +97,8 @@ INSTALL = "pip install 'multidrop[cluster]'"
 
 
 def cluster_results(
-    job: Job, rounds: Iterable[Iterator[Case]], address: str, interruption: Interruption, agree: Callable[[], None]
-) -> Iterator[list[Result]]:
+    job: TrialJob, rounds: Iterable[Iterator[Case]], address: str, interruption: Interruption, agree: Callable[[], None]
+) -> Iterator[list[TrialResult]]:
     """Run rounds of cases on the cluster of a scheduler; yield the results of each chunk as it ends.
 
     `agree` is called before anything is connected; it raises Diagnostic where a person has not agreed to the address.
@@ -112,9 +112,9 @@ def cluster_results(
             if not size and (first := next(cases, None)) is not None:
                 with interruption.open():
                     begin = time.process_time()
-                    found = trial.chunk(job, [first])
+                    first_results = trial.chunk(job, [first])
                 size = max(1, round(CHUNK / max(time.process_time() - begin, 1e-6)))
-                yield found
+                yield first_results
             if todo := list(chunks(cases, max(1, size))):
                 yield from _Work(client, job, address, interruption).results(todo)
 
@@ -136,14 +136,14 @@ def _client(address: str, interruption: Interruption, agree: Callable[[], None])
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         with interruption.open():
-            client = Client(address, timeout=PATIENCE, set_as_default=False)
+            client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as problem:
         raise Unreachable(f"{address}: no scheduler replies: {' '.join(str(problem).split())}") from None
     try:
         yield client
     finally:
         with suppress(OSError, TimeoutError):
-            client.close(timeout=PATIENCE)
+            client.close(timeout=SCHEDULER_TIMEOUT)
 
 
 @contextmanager
@@ -161,17 +161,17 @@ def _check_workers(client: Client, address: str) -> None:
     """Refuse a cluster without workers, and workers with another multidrop or without a reply."""
     try:
         run = client._run  # `run` waits for a worker that hangs without an end
-        found: dict[str, Any] = client.sync(run, trial.version, on_error="return", callback_timeout=SILENT)
+        versions: dict[str, Any] = client.sync(run, trial.version, on_error="return", callback_timeout=WORKER_TIMEOUT)
     except TimeoutError:
-        raise TransportLost(f"{address}: a worker does not reply within {SILENT:g} s") from None
+        raise TransportLost(f"{address}: a worker does not reply within {WORKER_TIMEOUT:g} s") from None
     except ImportError as problem:
         raise Diagnostic(
             f"a worker has no multidrop ({problem})", address, f"install {trial.version()} there"
         ) from None
-    if not found:
+    if not versions:
         raise Unreachable(f"{address}: the cluster has no workers")
     ours = trial.version()
-    for worker, theirs in found.items():
+    for worker, theirs in versions.items():
         if theirs != ours:
             what = "has no multidrop" if isinstance(theirs, BaseException) else f"has multidrop {theirs}"
             raise Diagnostic(f"{what}, and this is {ours}", f"worker {worker}", "install the same there")
@@ -180,7 +180,7 @@ def _check_workers(client: Client, address: str) -> None:
 class _Work:
     """The chunks of a sweep on a cluster, and what becomes of them."""
 
-    def __init__(self, client: Client, job: Job, address: str, interruption: Interruption) -> None:
+    def __init__(self, client: Client, job: TrialJob, address: str, interruption: Interruption) -> None:
         self._client, self._job, self._address, self._interruption = client, job, address, interruption
         self._again: list[list[Case]] = []
         """Chunks whose result was lost with a worker, and the rests of chunks that took long."""
@@ -188,7 +188,7 @@ class _Work:
         self._suspects: list[Case] = []
         """Cases of chunks whose workers died. The cluster counts against all that waited there, too."""
 
-    def results(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
+    def results(self, todo: list[list[Case]]) -> Iterator[list[TrialResult]]:
         """Run chunks; then alone each case whose workers died."""
         while todo:
             yield from self._run(todo)
@@ -196,7 +196,7 @@ class _Work:
             if not todo and self._suspects:
                 self._alone, todo = True, [[self._suspects.pop()]]
 
-    def _run(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
+    def _run(self, todo: list[list[Case]]) -> Iterator[list[TrialResult]]:
         """Submit chunks; yield the results of each as it ends."""
         from distributed import as_completed
 
@@ -209,9 +209,9 @@ class _Work:
                 with self._interruption.open():
                     self._wait(done)
                     future = next(done)
-                    found = self._result(future, of[future])
+                    results = self._result(future, of[future])
                 del of[future]
-                yield found
+                yield results
         finally:
             if of:
                 with suppress(OSError, TimeoutError):
@@ -225,46 +225,50 @@ class _Work:
         while not done.has_ready():
             with done.thread_condition:
                 done.thread_condition.wait(WAIT)
-            if (now := time.monotonic()) - looked < LOOK:
+            if (now := time.monotonic()) - looked < CHECK_PERIOD:
                 continue
             looked, last, heard = now, heard, self._heard()
             alive = now if heard and heard != last else alive
-            if now - alive >= SILENT:
-                raise TransportLost(f"{self._address}: no worker gave a sign of life for {SILENT:g} s")
+            if now - alive >= WORKER_TIMEOUT:
+                raise TransportLost(f"{self._address}: no worker gave a sign of life for {WORKER_TIMEOUT:g} s")
             if now - begun >= STUCK:
                 raise TransportLost(f"{self._address}: the workers gave no result for {STUCK:g} s")
 
     def _heard(self) -> dict[str, float]:
         """The time at which the scheduler last heard of each worker; none if the scheduler does not reply."""
         with suppress(OSError, TimeoutError):
-            found = self._client.sync(self._client.scheduler.identity, callback_timeout=PATIENCE)
-            return {name: each["last_seen"] for name, each in found["workers"].items()}
+            identity = self._client.sync(self._client.scheduler.identity, callback_timeout=SCHEDULER_TIMEOUT)
+            return {name: worker["last_seen"] for name, worker in identity["workers"].items()}
         return {}
 
-    def _result(self, future: Future, cases: list[Case]) -> list[Result]:
+    def _result(self, future: Future, cases: list[Case]) -> list[TrialResult]:
         """The results of a chunk; none if it is to run again. Raises TransportLost."""
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
         try:
-            problem = future.exception(timeout=SILENT) if future.status == "error" else None
+            problem = future.exception(timeout=WORKER_TIMEOUT) if future.status == "error" else None
             if problem is not None and not isinstance(problem, KilledWorker):
                 raise TransportLost(f"{self._address}: a worker failed: {type(problem).__name__}: {problem}")
-            found = future.result(timeout=SILENT)
-            numbers = [each.number for each in found if isinstance(each, Result)] if isinstance(found, list) else []
-            if not numbers or numbers != [number for number, _ in cases[: len(found)]]:
+            results = future.result(timeout=WORKER_TIMEOUT)
+            numbers = (
+                [result.number for result in results if isinstance(result, TrialResult)]
+                if isinstance(results, list)
+                else []
+            )
+            if not numbers or numbers != [number for number, _ in cases[: len(results)]]:
                 raise TransportLost(f"{self._address}: a worker replied with something else than results")
-            if len(found) < len(cases):
-                self._again.append(cases[len(found) :])
-            return list(found)
+            if len(results) < len(cases):
+                self._again.append(cases[len(results) :])
+            return list(results)
         except TimeoutError:
-            raise TransportLost(f"{self._address}: a result was not sent within {SILENT:g} s") from None
+            raise TransportLost(f"{self._address}: a result was not sent within {WORKER_TIMEOUT:g} s") from None
         except FutureCancelledError:
             if self._client.status != "running":
                 raise TransportLost(f"{self._address}: the scheduler was lost") from None
             self._again.append(cases)
         except KilledWorker:
             if self._alone:
-                return [Result(cases[0][0], DIED, "the workers that ran it died: killed, or out of memory")]
+                return [TrialResult(cases[0][0], DIED, "the workers that ran it died: killed, or out of memory")]
             self._suspects += cases
         return []

@@ -24,14 +24,14 @@ def run(log_file: str, cell_file: str, as_json: bool) -> int:
     """
     log, cell = Path(log_file), Path(cell_file.removeprefix("sim:"))
     steps.read(log)
-    found: list[Callable[[], None]] = []
+    changes: list[Callable[[], None]] = []
 
     async def body(session: Session) -> None:
-        found.append(await fit(session, log, cell, as_json))
+        changes.append(await fit(session, log, cell, as_json))
 
     code = runner.run([f"sim:{cell}"], body, unsolicited=False, replies=False, loop=VirtualLoop)
     if not code and stdout.dropped:
         stdout.write(sys.stderr, f"{cell} is unchanged: its values could not be shown")
     elif not code:
-        found[0]()
+        changes[0]()
     return code

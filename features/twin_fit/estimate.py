@@ -35,7 +35,7 @@ LOAD, FRICTION, INERTIA, MARGIN = "load", "friction", "inertia", "current margin
 UNITS = {LOAD: "of the holding torque", FRICTION: "N m for each rev/s", INERTIA: "kg m2", MARGIN: "of the torque"}
 
 
-class Point(NamedTuple):
+class LagPoint(NamedTuple):
     """A measured lag along the turn, full steps, at a speed and an acceleration along it, rev/s and rev/s2."""
 
     lag: float
@@ -49,10 +49,10 @@ class Point(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Evidence:
+class AxisEvidence:
     """What a log has of one axis. `moves`: those that did not stall; `seen`: a stall would have been seen."""
 
-    points: Sequence[Point] = ()
+    points: Sequence[LagPoint] = ()
     moves: Sequence[Effort] = ()
     stalled: int = 0
     seen: bool = False
@@ -62,11 +62,12 @@ class Evidence:
     """For each sample of such a move, whether the cell commands no such velocity near it."""
 
     @property
-    def different(self) -> Sequence[Point]:
+    def different(self) -> Sequence[LagPoint]:
         """The points without those that repeat."""
         return list(
             {
-                (round(each.lag, 4), round(each.speed, 4), round(each.acceleration, 2)): each for each in self.points
+                (round(point.lag, 4), round(point.speed, 4), round(point.acceleration, 2)): point
+                for point in self.points
             }.values()
         )
 
@@ -93,14 +94,14 @@ class Estimate(NamedTuple):
         return self.within <= TOLD * self.whole
 
 
-def estimates(evidence: Evidence, motor: MotorSpec) -> dict[str, Estimate]:
+def estimates(evidence: AxisEvidence, motor: MotorSpec) -> dict[str, Estimate]:
     """Estimate each value. Raises Diagnostic where scipy is missing."""
     if len(evidence.different) >= FEWEST and evidence.fits:
         return _Fit(evidence, motor).estimates()
     unknown = dict.fromkeys(UNITS, Estimate(0.0, inf, 0.0))
     if evidence.seen and evidence.moves:
         torque = Torque(WorldSpec(motor=motor, load=1.0))
-        used = max(torque.most_used(each.profile, each.current, each.turn) for each in evidence.moves)
+        used = max(torque.most_used(move.profile, move.current, move.turn) for move in evidence.moves)
         unknown[LOAD] = Estimate(0.0, inf, 0.0, 1 / used if used else inf)
     return unknown
 
@@ -108,7 +109,7 @@ def estimates(evidence: Evidence, motor: MotorSpec) -> dict[str, Estimate]:
 class _Fit:
     """The fit of one axis. The unknowns are in units in which they are near 1."""
 
-    def __init__(self, evidence: Evidence, motor: MotorSpec) -> None:
+    def __init__(self, evidence: AxisEvidence, motor: MotorSpec) -> None:
         try:
             import numpy  # comes with scipy
             from scipy.optimize import least_squares  # takes half a second to import
@@ -117,41 +118,41 @@ class _Fit:
         self._evidence, self._motor, self._numpy = evidence, motor, numpy
         # A machine that does the same again is rounded in the same way: samples that repeat tell nothing new.
         holding, points = motor.curve[0][1], evidence.different
-        fastest = max(each.speed for each in points)
-        steepest = max(abs(each.acceleration) for each in points)
+        fastest = max(point.speed for point in points)
+        steepest = max(abs(point.acceleration) for point in points)
         self._units = (1.0, holding / fastest, holding / (2 * pi * steepest) if steepest else 1.0)
         # The torque of each point is that of the rotor alone and a part for each unknown: rows of a matrix.
-        torques = [Torque(self._world([float(n == each) for each in range(3)])) for n in range(4)]
+        torques = [Torque(self._world([float(n == index) for index in range(3)])) for n in range(4)]
         alone = torques.pop()
-        there = [max(each.current * alone.available(each.speed), TINY) for each in points]
-        rotor = [alone.needed(each.speed, each.acceleration) for each in points]
-        parts = [[one.needed(each.speed, each.acceleration) for one in torques] for each in points]
+        there = [max(point.current * alone.available(point.speed), TINY) for point in points]
+        rotor = [alone.needed(point.speed, point.acceleration) for point in points]
+        parts = [[one.needed(point.speed, point.acceleration) for one in torques] for point in points]
         self._there, self._rotor = numpy.array(there), numpy.array(rotor)
         self._parts = numpy.array(parts) - self._rotor[:, None]
         self._lags, self._grains, self._directions = (
-            numpy.array(each) for each in zip(*((p.lag, p.grain, p.direction) for p in points), strict=True)
+            numpy.array(column) for column in zip(*((p.lag, p.grain, p.direction) for p in points), strict=True)
         )
-        found = least_squares(
+        fitted = least_squares(
             self._residuals, (0.1, 0.01, 0.01, 0.0), bounds=((0, 0, 0, -1), (10, 100, 100, 1)), loss="soft_l1"
         )
-        self._x: list[float] = found.x.tolist()
-        self._jacobian: Any = found.jac
-        residuals = self._residuals(found.x)
+        self._x: list[float] = fitted.x.tolist()
+        self._jacobian: Any = fitted.jac
+        residuals = self._residuals(fitted.x)
         scatter = sqrt(float(residuals @ residuals) / (len(residuals) - len(self._x)))
         self._sigma = max(scatter, HALF_COUNT)
 
     def estimates(self) -> dict[str, Estimate]:
         world = self._world(self._x)
         values = {LOAD: world.load, FRICTION: world.friction, INERTIA: world.inertia}
-        found = {}
+        estimates = {}
         for n, (name, value) in enumerate(values.items()):
-            within = self._within([float(n == each) for each in range(4)]) * self._units[n]
-            found[name] = Estimate(value, within, value, value + within)
-        steps = [[x + (1e-4 if n == each else 0.0) for each, x in enumerate(self._x)] for n in range(4)]
+            within = self._within([float(n == index) for index in range(4)]) * self._units[n]
+            estimates[name] = Estimate(value, within, value, value + within)
+        steps = [[x + (1e-4 if n == index else 0.0) for index, x in enumerate(self._x)] for n in range(4)]
         margin = self._margin(self._x)
-        slope = [(self._margin(each) - margin) / 1e-4 for each in steps]
-        found[MARGIN] = Estimate(margin, self._within(slope), 1 - margin)
-        return found
+        slope = [(self._margin(step) - margin) / 1e-4 for step in steps]
+        estimates[MARGIN] = Estimate(margin, self._within(slope), 1 - margin)
+        return estimates
 
     def _world(self, x: Sequence[float]) -> WorldSpec:
         load, friction, inertia = (value * unit for value, unit in zip(x, self._units, strict=False))
@@ -160,7 +161,7 @@ class _Fit:
     def _margin(self, x: Sequence[float]) -> float:
         """What the hardest move leaves of the torque."""
         torque = Torque(self._world(x))
-        return 1 - max(torque.most_used(each.profile, each.current, each.turn) for each in self._evidence.moves)
+        return 1 - max(torque.most_used(move.profile, move.current, move.turn) for move in self._evidence.moves)
 
     def _residuals(self, x: Any) -> Any:
         """The differences of all points in counts, after that of the place of a count."""

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class TwinOptions:
     """What a command is asked for."""
 
     twin: Annotated[bool, Argument("run a simulated twin beside each drive; warn of differences", one_of=RAW)] = False
 
 
-MOST = 1_000_000_000
+LARGEST_LIMIT = 1_000_000_000
 """The largest limit of twins, steps."""
 
 
 def _steps(text: str) -> int:
-    if (steps := whole(text, 1, MOST)) is None:
-        raise ArgumentTypeError(f"no limit {text!r}: steps from 1 to {MOST}")
+    if (steps := whole(text, 1, LARGEST_LIMIT)) is None:
+        raise ArgumentTypeError(f"no limit {text!r}: steps from 1 to {LARGEST_LIMIT}")
     return steps
 
 
@@ -73,7 +73,7 @@ def _runs(session: Session) -> bool:
     return session.buses.get(session.selected_bus) in session.predicted
 
 
-def _want(session: Session, asked: Asked) -> None:
+def _want(session: Session, asked: TwinOptions) -> None:
     """Let each bus whose drives are found get twins."""
     if asked.twin:
         from multidrop.features.twins.twins import Twins
@@ -81,7 +81,7 @@ def _want(session: Session, asked: Asked) -> None:
         session.hooks.part(Twins).wanted = True
 
 
-async def _start(session: Session, asked: Asked) -> None:
+async def _start(session: Session, asked: TwinOptions) -> None:
     """Begin twins before the first line of a stream."""
     if asked.twin:
         from multidrop.features.twins.twins import Twins
@@ -124,7 +124,7 @@ its twin moves on. `/twin` alone lists the twins.
             "a twin beside each drive of the line, or none",
             _runs,
         ),
-        Options("tui", Asked, prepare=_want),
-        Options("shell", Asked, prepare=_want, opened=_start),
+        Options("tui", TwinOptions, prepare=_want),
+        Options("shell", TwinOptions, prepare=_want, opened=_start),
     ),
 )

@@ -30,7 +30,7 @@ from multidrop.drives.events import (
     Valued,
 )
 from multidrop.drives.port_journal import GLOBAL
-from multidrop.drives.telemetry import Subscription, Value
+from multidrop.drives.telemetry import DriveValue, Subscription
 from multidrop.features.twins.twin import LIMITS, Twin
 from multidrop.shell.comparing.compared import Compared
 from multidrop.shell.comparing.differences import (
@@ -38,7 +38,7 @@ from multidrop.shell.comparing.differences import (
     HOMING,
     PUSHED,
     UNSEEN,
-    Comparison,
+    AxisComparison,
     Pair,
     unmoved,
 )
@@ -65,22 +65,22 @@ def reading_took(concluded: Concluded) -> float | None:
 
 def taken(concluded: Concluded) -> Iterator[Transaction]:
     """Yield the transactions of which the drive has taken the request; no polls."""
-    commands = [each for each in concluded.transactions if each.request.kind not in ASKING]
+    commands = [transaction for transaction in concluded.transactions if transaction.request.kind not in ASKING]
     failed_with = commands[-1] if concluded.outcome.error is not None and commands else None
-    for each in concluded.transactions:
-        doubtful = each is failed_with and not each.reply.acknowledged
-        polled = each.request.priority is Priority.POLL
-        if each.sent and each.reply.end not in NOT_TAKEN and not doubtful and not polled:
-            yield each
+    for transaction in concluded.transactions:
+        doubtful = transaction is failed_with and not transaction.reply.acknowledged
+        polled = transaction.request.priority is Priority.POLL
+        if transaction.sent and transaction.reply.end not in NOT_TAKEN and not doubtful and not polled:
+            yield transaction
 
 
 DRIFT = 0.005
 """The part of the time by which a program may run faster or slower than in the twin."""
-LONGEST = 30.0
+LONGEST_DRIFT_TIME = 30.0
 """Seconds without a steady move whose drift is made good at once, at most."""
 
 
-class Beside(Compared[Twin]):
+class TwinPair(Compared[Twin]):
     """One drive with its twin. Times are those of the host's clock."""
 
     def __init__(self, drive: Drive, twin: Twin, begun: float) -> None:
@@ -119,13 +119,13 @@ class Beside(Compared[Twin]):
         else:
             self._keep_step(axis)
 
-    def _meet(self, name: str, axis: Comparison, pair: Pair, awaited: str | None) -> None:
+    def _meet(self, name: str, axis: AxisComparison, pair: Pair, awaited: str | None) -> None:
         """Learn of a difference where a switch is: one that homing awaits, or a limit that is seen to be active."""
         if axis.lost:
             axis.learned = self.twin.meet(name, awaited or "", pair.at) or axis.learned
         elif not pair.velocity and (limits := self._limits.get(name)):
-            for each in limits:
-                self.twin.meet(name, LIMITS[each], pair.at)
+            for limit in limits:
+                self.twin.meet(name, LIMITS[limit], pair.at)
             self.twin.align(name, pair.position, pair.at)
             axis.lose(f"a limit ({', '.join(limits)})", pair.at)
             axis.learned = True
@@ -133,7 +133,9 @@ class Beside(Compared[Twin]):
             self.twin.forget(name)
             axis.lose("a limit that is not where it was", pair.at)
 
-    def _take_position(self, sample: Sample, axis: Comparison, rest: int, awaited: str | None) -> Iterator[TwinEvent]:
+    def _take_position(
+        self, sample: Sample, axis: AxisComparison, rest: int, awaited: str | None
+    ) -> Iterator[TwinEvent]:
         """Take the position of a drive at rest; say so unless the twin was there."""
         pair, why = axis.pairs[-1], axis.lost
         beyond = abs(pair.difference) > axis.limit(pair, rest)
@@ -150,9 +152,9 @@ class Beside(Compared[Twin]):
     @property
     def asks(self) -> bool:
         """Whether the lamps of the drive would tell why it stands."""
-        return any(each.held for each in self.axes.values() if each.pairs)
+        return any(axis.held for axis in self.axes.values() if axis.pairs)
 
-    def _keep_step(self, comparison: Comparison) -> None:
+    def _keep_step(self, comparison: AxisComparison) -> None:
         """Shift the twin's time a little where a drive is early or late at an equal velocity.
 
         The lines of its program take another time than the simulator's. No shift changes where the two rest.
@@ -160,7 +162,7 @@ class Beside(Compared[Twin]):
         if not comparison.steady:
             return
         before, pair = list(comparison.pairs)[-2:]
-        most = DRIFT * min(pair.at - self._in_step_at, LONGEST)
+        most = DRIFT * min(pair.at - self._in_step_at, LONGEST_DRIFT_TIME)
         late = pair.difference / copysign(pair.fastest, pair.predicted - before.predicted)
         late = copysign(max(0.0, abs(late) - comparison.took), late)  # what the reading took is not the drive's
         self.twin.shift(max(-most, min(most, late)))
@@ -175,15 +177,15 @@ class Beside(Compared[Twin]):
             self._quickest = min(self._quickest, last.ended_at - last.transmitted_at)
             self._note_delay(last)
             self._took = took + self._delay
-        for each in taken(concluded):
-            data = each.request.codec.encode(each.request)
-            disturbs = each.request.kind not in ASKING
-            if disturbs and each.reply.acknowledged:
-                self._note_delay(each)
-            self._acts(data, each.transmitted_at, disturbs)
-            found = self.drive.family.referencing(each.request.text) if disturbs else None
-            if found is not None and found.homing:
-                self.comparison(found.axis).lose(HOMING, each.transmitted_at)
+        for request in taken(concluded):
+            data = request.request.codec.encode(request.request)
+            disturbs = request.request.kind not in ASKING
+            if disturbs and request.reply.acknowledged:
+                self._note_delay(request)
+            self._acts(data, request.transmitted_at, disturbs)
+            referencing = self.drive.family.referencing(request.request.text) if disturbs else None
+            if referencing is not None and referencing.homing:
+                self.comparison(referencing.axis).lose(HOMING, request.transmitted_at)
         if concluded.unproven:
             self.doubtful = concluded.unproven
 
@@ -214,7 +216,7 @@ class Beside(Compared[Twin]):
         self.twin.hear(data, at)
 
 
-PERIOD = 0.1
+SAMPLE_PERIOD = 0.1
 """Seconds between two samples of a drive, at most."""
 INPUTS = 0.05
 """Seconds between two readings of the inputs of a drive, at most."""
@@ -227,7 +229,7 @@ class BusTwins:
         """`limit`: that at rest, steps. `lost`: called when the line is lost."""
         self.bus = bus
         self._limit = limit
-        self.besides: dict[Drive, Beside] = {}
+        self.besides: dict[Drive, TwinPair] = {}
         self._waiting: dict[Drive, list[Concluded]] = {}
         """The conversations of a drive that is being read."""
         self._publish, self._lost = publish, lost
@@ -237,7 +239,7 @@ class BusTwins:
         self._polled: list[str] = []
         """The addresses that are read."""
         self._samples: Subscription[str] | None = None
-        self._inputs: Subscription[Value] | None = None
+        self._inputs: Subscription[DriveValue] | None = None
         self._asked: dict[str, Subscription[str]] = {}
         """The drives whose lamps are read once, by address."""
 
@@ -255,12 +257,12 @@ class BusTwins:
         """Keep what a drive takes after its snapshot, until its twin is there."""
         self._waiting[drive] = []
 
-    def begin(self, beside: Beside) -> None:
+    def begin(self, beside: TwinPair) -> None:
         """Begin to run a twin, with what its drive took meanwhile."""
         self.remove(beside.drive)
         self.besides[beside.drive] = beside
-        for each in self._waiting.pop(beside.drive, ()):
-            beside.concluded(each)
+        for concluded in self._waiting.pop(beside.drive, ()):
+            beside.concluded(concluded)
         self._poll()
 
     def forgo(self, drive: Drive) -> None:
@@ -280,17 +282,17 @@ class BusTwins:
 
     def _poll(self) -> None:
         telemetry, before = self.bus.telemetry, (self._samples, self._inputs)
-        addresses = self._polled = [each.address for each in self.besides]
+        addresses = self._polled = [beside.address for beside in self.besides]
         words = [
-            Value(drive.address, beside.twin.levels.word)
+            DriveValue(drive.address, beside.twin.levels.word)
             for drive, beside in self.besides.items()
             if beside.twin.levels is not None
         ]
-        self._samples = telemetry.subscribe(addresses, PERIOD) if addresses else None
+        self._samples = telemetry.subscribe(addresses, SAMPLE_PERIOD) if addresses else None
         self._inputs = telemetry.read(words, INPUTS) if words else None
-        for each in (*before, *self._asked.values()):
-            if each is not None:
-                each.close()
+        for subscription in (*before, *self._asked.values()):
+            if subscription is not None:
+                subscription.close()
         self._asked = {}
 
     # Events
@@ -327,7 +329,7 @@ class BusTwins:
         elif isinstance(event, Lost):
             self._lost()
 
-    def _at(self, address: str) -> Beside | None:
+    def _at(self, address: str) -> TwinPair | None:
         drive = self.bus.drives.get(address)
         return self.besides.get(drive) if drive is not None else None
 

@@ -38,7 +38,7 @@ class Twin:
     def live(self, at: float) -> float:
         """Live up to a time of the host's clock; return the drive's own time."""
         self._now = max(self._now, at - self._begun)
-        self._overheard += [each for each in self._unit.port.sent(self._now) if each.overheard]
+        self._overheard += [transmission for transmission in self._unit.port.sent(self._now) if transmission.overheard]
         return self._now
 
     def hear(self, data: bytes, at: float) -> None:
@@ -56,7 +56,7 @@ class Twin:
     def printed(self) -> list[bytes]:
         """The bytes for other drives of its line that it has sent since the last call."""
         printed, self._overheard = self._overheard, []
-        return [each.data for each in printed]
+        return [transmission.data for transmission in printed]
 
     def put(self, value: int, at: float) -> bool:
         """Set the inputs as they were read; return whether one has changed."""
@@ -72,7 +72,7 @@ class Twin:
         return changed
 
     def motion(self, at: float) -> dict[str, Motion]:
-        return {each.axis: each for each in self._shadow.motion(self.live(at))}
+        return {of_axis.axis: of_axis for of_axis in self._shadow.motion(self.live(at))}
 
     def align(self, axis: str, position: int, at: float) -> None:
         self._shadow.align(axis, position, self.live(at))
@@ -98,11 +98,11 @@ class Twin:
         """Whether it stands at a limit that it has learned."""
         now, shaft = self.live(at), self._shadow.shafts.get(axis)
         closed = shaft.switches(now)[1:] if shaft is not None else ()
-        return any(on and (axis, each) in self._learned for on, each in zip(closed, LIMITS.values(), strict=False))
+        return any(on and (axis, limit) in self._learned for on, limit in zip(closed, LIMITS.values(), strict=False))
 
     def forget(self, axis: str) -> None:
         """Forget the switches of an axis that it has learned."""
-        for name, switch in [each for each in self._learned if each[0] == axis]:
+        for name, switch in [learned for learned in self._learned if learned[0] == axis]:
             self._learned.discard((name, switch))
             self._shadow.shafts[axis].world.learn(switch, None)
 

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
-from multidrop.shell.comparing.differences import LIMIT
+from multidrop.shell.comparing.differences import DIFFERENCE_LIMIT
 from multidrop.shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
 
 if TYPE_CHECKING:
@@ -33,8 +33,8 @@ def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
     """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
     from multidrop.shell.setting_units import distance
 
-    found = distance(session, drive, axis, steps) if session.scaled else ""
-    return f" ({found})" if found else ""
+    length = distance(session, drive, axis, steps) if session.scaled else ""
+    return f" ({length})" if length else ""
 
 
 class Twins:
@@ -46,7 +46,7 @@ class Twins:
         self.wanted = False
         """Each bus whose drives are found gets twins."""
         self._workspace = workspace
-        self._rest = LIMIT
+        self._rest = DIFFERENCE_LIMIT
         self._buses: dict[Bus, BusTwins] = {}
         self._paused: dict[Bus, list[str]] = {}
         """The addresses of the twins that a loss has ended, by bus."""
@@ -61,8 +61,8 @@ class Twins:
     @limit.setter
     def limit(self, steps: int) -> None:
         self._rest = steps
-        for each in self._buses.values():
-            each.set_limit(steps)
+        for bus in self._buses.values():
+            bus.set_limit(steps)
 
     async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
         """Read drives of a bus (None: all), and begin a twin beside each, in place of one that runs.
@@ -70,7 +70,7 @@ class Twins:
         Raises DriveError, Diagnostic or TransportLost for the first that fails, once all have been tried; the others
         are warnings. A stop, or the end of the twins, ends the reading.
         """
-        drives = [bus.drives[each] for each in (list(bus.drives) if addresses is None else addresses)]
+        drives = [bus.drives[address] for address in (list(bus.drives) if addresses is None else addresses)]
         from multidrop.features.twins.pair import BusTwins
 
         if bus not in self._buses:
@@ -93,8 +93,8 @@ class Twins:
                 self._end(bus)
             # Each gap is reported once; drives with an equal gap share a line.
             for gap, names in gaps.items():
-                if fresh := [each for each in names if (each, gap) not in self._said]:
-                    self._said |= {(each, gap) for each in fresh}
+                if fresh := [name for name in names if (name, gap) not in self._said]:
+                    self._said |= {(address, gap) for address in fresh}
                     self._workspace.notify(f"twin of {', '.join(fresh)}: {gap}", bus=bus.name, outcome=True)
         for other in failures[1:]:
             self._workspace.notify(f"{bus.name}: no twin: {other}", bus=bus.name, warning=True)
@@ -122,7 +122,7 @@ class Twins:
 
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
-        from multidrop.features.twins.pair import Beside
+        from multidrop.features.twins.pair import TwinPair
         from multidrop.features.twins.twin import make
         from multidrop.shell import snapshots
 
@@ -138,7 +138,7 @@ class Twins:
                 )
             begun = bus.now()
             twin, gaps = make(snapshot, begun, drive.family.offers("registers"), len(bus.drives) == 1)
-            twins.begin(Beside(drive, twin, begun))
+            twins.begin(TwinPair(drive, twin, begun))
             self._workspace.predicted.add(bus)
         finally:
             twins.forgo(drive)
@@ -154,8 +154,8 @@ class Twins:
 
     def changed(self, bus: Bus) -> None:
         if bus.lost is None and bus in self._paused:
-            found = [each for each in self._paused.pop(bus) if each in bus.drives]
-            self._begin(bus, found)
+            paused = [address for address in self._paused.pop(bus) if address in bus.drives]
+            self._begin(bus, paused)
 
     def _begin(self, bus: Bus, addresses: Sequence[str] | None) -> None:
         task = asyncio.get_running_loop().create_task(self._try(bus, addresses))
@@ -169,7 +169,7 @@ class Twins:
             self._workspace.notify(f"{bus.name}: no twin: {failure}", bus=bus.name, warning=True)
 
     def _lost(self, bus: Bus) -> None:
-        addresses = [each.address for each in self._buses[bus].drives]
+        addresses = [drive.address for drive in self._buses[bus].drives]
         self.stop(bus)
         self._paused[bus] = addresses
         back = "; they begin again once it is back" if self._workspace.reconnections.tries(bus.name) else ""
@@ -180,9 +180,9 @@ class Twins:
     def rows(self) -> Iterator[str]:
         for twins in self._buses.values():
             for drive, beside in twins.besides.items():
-                found = beside.differences.items()
-                apart = [f"{axis} {steps}".strip() for axis, steps in found]
-                units = [each.strip(" ()") for axis, steps in found if (each := self._in_units(drive, axis, steps))]
+                compared = beside.differences.items()
+                apart = [f"{axis} {steps}".strip() for axis, steps in compared]
+                units = [text.strip(" ()") for axis, steps in compared if (text := self._in_units(drive, axis, steps))]
                 began = f"{self._workspace.wall(beside.begun):%H:%M:%S}"
                 said = f"apart by {', '.join(apart)} steps" if apart else "not compared yet"
                 said += f" ({', '.join(units)})" if units else ""

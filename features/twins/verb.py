@@ -26,7 +26,7 @@ async def on(call: Call, targets: Sequence[str]) -> None:
         if not bus.drives:
             raise Diagnostic(f"no drive has replied on {bus.name}", call.verb.name)
         return await twins.start(bus)
-    drives = list(dict.fromkeys(call.drive(each) for each in targets))
+    drives = list(dict.fromkeys(call.drive(target) for target in targets))
     for drive in drives:
         bus = workspace.buses[drive.link.name]
         if bus.drives.get(drive.address) is not drive:

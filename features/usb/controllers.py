@@ -35,7 +35,7 @@ ASKING = 100
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundController:
     """A controller on this machine. `place`: the bus and the sockets from its root on, as `1-1.4`."""
 
     number: str
@@ -66,8 +66,8 @@ def library() -> ModuleType:
     return sys.modules["usb1"]
 
 
-def controllers(usb1: ModuleType, context: Any) -> list[Found]:
-    found = []
+def controllers(usb1: ModuleType, context: Any) -> list[FoundController]:
+    controllers_there = []
     for device in context.getDeviceIterator(skip_on_error=True):
         if (device.getVendorID(), device.getProductID()) == (interface.VENDOR, interface.PRODUCT):
             bus, ports = device.getBusNumber(), ".".join(map(str, device.getPortNumberList())) or "0"
@@ -76,8 +76,8 @@ def controllers(usb1: ModuleType, context: Any) -> list[Found]:
                 number = device.getSerialNumber() or _asked(usb1, device)
             except usb1.USBError:
                 number = UNREAD
-            found.append(Found(number, f"{bus}-{ports}", path, device))
-    return sorted(found, key=lambda each: natural(each.place))
+            controllers_there.append(FoundController(number, f"{bus}-{ports}", path, device))
+    return sorted(controllers_there, key=lambda each: natural(each.place))
 
 
 def _asked(usb1: ModuleType, device: Any) -> str:
@@ -85,24 +85,27 @@ def _asked(usb1: ModuleType, device: Any) -> str:
     handle = device.open()
     try:
         handle.claimInterface(0)
-        for value in (interface.Control.OPEN, interface.Control.FLUSH):
+        for value in (interface.UsbControl.OPEN, interface.UsbControl.FLUSH):
             handle.controlWrite(interface.REQUEST_TYPE, interface.REQUEST, value, 0, b"", ASKING)
         with contextlib.suppress(usb1.USBErrorTimeout):
             handle.bulkRead(interface.IN, interface.PACKET, ASKING)  # what an earlier session has left
         handle.bulkWrite(interface.OUT, b"DN\0", ASKING)
         reply = bytes(handle.bulkRead(interface.IN, interface.PACKET, ASKING)).partition(b"\0")[0].decode("latin-1")
-        handle.controlWrite(interface.REQUEST_TYPE, interface.REQUEST, interface.Control.CLOSE, 0, b"", ASKING)
+        handle.controlWrite(interface.REQUEST_TYPE, interface.REQUEST, interface.UsbControl.CLOSE, 0, b"", ASKING)
         return reply if re.fullmatch(r"\w+", reply, re.ASCII) else UNREAD
     finally:
         handle.close()
 
 
-def list_controllers() -> list[Found]:
+def list_controllers() -> list[FoundController]:
     """The controllers of this machine. Raises Unreachable where the library is not installed."""
     usb1 = library()
     try:
         with usb1.USBContext() as context:
-            return [Found(each.number, each.place, each.path) for each in controllers(usb1, context)]
+            return [
+                FoundController(controller.number, controller.place, controller.path)
+                for controller in controllers(usb1, context)
+            ]
     except usb1.USBError:
         return []  # a machine without USB
 
@@ -110,25 +113,27 @@ def list_controllers() -> list[Found]:
 def ports() -> list[PortInfo]:
     """The controllers of this machine as ports; none where the library is not installed."""
     try:
-        found = list_controllers()
+        plugged = list_controllers()
     except Unreachable:
-        found = []
+        plugged = []
     return [
-        PortInfo(each.url, description=permission() if each.number == UNREAD else interface.MODULE.module)
-        for each in found
+        PortInfo(controller.url, description=permission() if controller.number == UNREAD else interface.MODULE.module)
+        for controller in plugged
     ]
 
 
-def chosen(found: list[Found], target: str) -> Found:
+def chosen(found: list[FoundController], target: str) -> FoundController:
     """The controller that a URL names by its target. Raises Unreachable."""
     number, _, place = target.partition("@")
-    listed = ", ".join(each.url for each in found) or "none"
-    if any(each.number == UNREAD for each in found):
+    listed = ", ".join(controller.url for controller in found) or "none"
+    if any(controller.number == UNREAD for controller in found):
         listed += f"; where a number cannot be read: {permission()}"
     if re.fullmatch(r"\d{1,3}", target):
         matching = found[int(target) :][:1]
     else:
-        matching = [each for each in found if number in ("", each.number) and place in ("", each.place)]
+        matching = [
+            controller for controller in found if number in ("", controller.number) and place in ("", controller.place)
+        ]
     if not matching:
         raise Unreachable(f"usb:{target} is not there; controllers on USB: {listed}")
     if len(matching) > 1:
@@ -145,7 +150,7 @@ def permission() -> str:
     return f"copy {RULE} to /etc/udev/rules.d and plug it in again"
 
 
-def refusal(code: int, found: Found) -> str:
+def refusal(code: int, found: FoundController) -> str:
     """The reason why a controller could not be opened, from libusb's error."""
     if code == _BUSY:
         return f"{holder(found.path) or 'another connection'} has it"

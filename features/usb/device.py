@@ -21,12 +21,12 @@ from multidrop.features.usb.interface import (
     REQUEST_TYPE,
     STALLED,
     VENDOR,
-    Control,
+    UsbControl,
 )
 from multidrop.simulator.family import Device, UsbSide
 from multidrop.simulator.floor import Floor
 
-HELD = 16
+MOST_HELD_REPLIES = 16
 """Replies that the controller holds; older ones are lost."""
 DEVICE, CONFIGURATION, STRING = 1, 2, 3
 """Types of descriptors."""
@@ -44,7 +44,7 @@ class UsbController:
 
     device: Device
     pipe: UsbSide
-    replies: deque[bytes] = field(default_factory=lambda: deque(maxlen=HELD))
+    replies: deque[bytes] = field(default_factory=lambda: deque(maxlen=MOST_HELD_REPLIES))
     """Replies that the host has not read."""
     _configured: int = 1
 
@@ -68,13 +68,13 @@ class UsbController:
     def request(self, setup: bytes) -> tuple[int, bytes]:
         kind, request, value, index, length = struct.unpack("<BBHHH", setup)
         if (kind, request) == (REQUEST_TYPE, REQUEST):
-            if value == Control.FLUSH:
+            if value == UsbControl.FLUSH:
                 self.replies.clear()
-            return (0, b"") if value in tuple(Control) else (STALLED, b"")
+            return (0, b"") if value in tuple(UsbControl) else (STALLED, b"")
         match kind, request:
             case 0x80, 6:
-                found = self._descriptor(value >> 8, value & 0xFF)
-                return (0, found[:length]) if found else (STALLED, b"")
+                descriptor = self._descriptor(value >> 8, value & 0xFF)
+                return (0, descriptor[:length]) if descriptor else (STALLED, b"")
             case 0x80, 8:
                 return 0, bytes([self._configured])
             case 0x00, 9 if value in (0, 1):
@@ -108,6 +108,6 @@ def sides(floor: Floor, bus: str) -> list[UsbController]:
     """The USB sides of the controllers of a bus, in their order: the same ones for everyone who asks."""
     buses = _SIDES.setdefault(floor, {})
     if bus not in buses:
-        units = [each.unit for each in floor.drives if each.bus == bus]
-        buses[bus] = [UsbController(each.device, each.on_usb) for each in units if each.on_usb is not None]
+        units = [drive.unit for drive in floor.drives if drive.bus == bus]
+        buses[bus] = [UsbController(unit.device, unit.on_usb) for unit in units if unit.on_usb is not None]
     return buses[bus]

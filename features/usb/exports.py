@@ -145,8 +145,8 @@ class UsbipClient(asyncio.Protocol):
                 self._buffer += data
                 data = self._operate()
             if self._plugged is not None and data:
-                for each in self._messages.feed(data):
-                    self._take(self._plugged, each)
+                for transfer in self._messages.feed(data):
+                    self._take(self._plugged, transfer)
         except Malformed as error:
             self._server.floor.notify(f"{self._server.bus}: a client of usbip:// was disconnected: {error}")
             self.end()
@@ -159,9 +159,9 @@ class UsbipClient(asyncio.Protocol):
             return b""
         _, code, _ = OPERATION.unpack_from(self._buffer)
         if code == REQ_LIST:
-            found = [each for each in self._server.devices.values() if self._server.present(each)]
-            records = b"".join(each.exported.pack() + INTERFACE for each in found)
-            self._send(operation(REP_LIST, 0, len(found).to_bytes(4) + records))
+            devices = [device for device in self._server.devices.values() if self._server.present(device)]
+            records = b"".join(device.exported.pack() + INTERFACE for device in devices)
+            self._send(operation(REP_LIST, 0, len(devices).to_bytes(4) + records))
             self.end()
         elif code == REQ_IMPORT:
             if len(self._buffer) >= OPERATION.size + BUS_ID:

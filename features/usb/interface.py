@@ -13,12 +13,12 @@ OUT, IN = 0x02, 0x82
 PACKET = 64
 """Bytes of a packet, each way."""
 REQUEST_TYPE, REQUEST = 0x40, 0x02
-"""A vendor request to the device; its value is a `Control`."""
+"""A vendor request to the device; its value is a `UsbControl`."""
 CANCELLED, STALLED, GONE, TIMEOUT = -104, -32, -19, -110
 """Ends of a transfer, in the numbers of Linux, which USB/IP uses on every system."""
 
 
-class Control(IntEnum):
+class UsbControl(IntEnum):
     """The values of the vendor request."""
 
     FLUSH = 1

@@ -34,16 +34,16 @@ class LibusbCarrier:
         with contextlib.ExitStack() as stack:
             try:
                 self._context = stack.enter_context(usb1.USBContext())
-                found = chosen(controllers(usb1, self._context), target)
+                controller = chosen(controllers(usb1, self._context), target)
             except usb1.USBError as error:
                 raise Unreachable(f"usb:{target}: {error}") from error
             try:
-                self._handle = found.device.open()
+                self._handle = controller.device.open()
                 self._handle.claimInterface(0)
             except usb1.USBError as error:
-                raise Unreachable(f"{found.url}: {refusal(error.value, found)}") from error
+                raise Unreachable(f"{controller.url}: {refusal(error.value, controller)}") from error
             self._opened = stack.pop_all()
-        self.name = found.url
+        self.name = controller.url
         self._guard = threading.Lock()
         self._transfers: dict[int, Any] = {}
         """Transfers that have not ended, by number."""
@@ -60,7 +60,7 @@ class LibusbCarrier:
         self._thread = threading.Thread(target=self._watch, name=f"{self.name} events", daemon=True)
         self._thread.start()
 
-    def control(self, value: interface.Control) -> int:
+    def control(self, value: interface.UsbControl) -> int:
         return self._begin("setControl", interface.REQUEST_TYPE, interface.REQUEST, value, 0, b"")
 
     def send(self, data: bytes) -> int:
@@ -108,7 +108,7 @@ class LibusbCarrier:
             for endpoint in self._stalled:
                 self._handle.clearHalt(endpoint)
             self._handle.controlWrite(
-                interface.REQUEST_TYPE, interface.REQUEST, interface.Control.CLOSE, 0, b"", ASKING
+                interface.REQUEST_TYPE, interface.REQUEST, interface.UsbControl.CLOSE, 0, b"", ASKING
             )
         self._handle.close()
         self._opened.close()

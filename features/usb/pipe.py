@@ -20,7 +20,7 @@ from math import inf
 from typing import Protocol
 
 from multidrop.base.errors import TransportLost
-from multidrop.features.usb.interface import CANCELLED, GONE, STALLED, TIMEOUT, Control
+from multidrop.features.usb.interface import CANCELLED, GONE, STALLED, TIMEOUT, UsbControl
 from multidrop.transports import Undelivered, Unreachable
 from multidrop.transports.pipe import Pipe
 from multidrop.transports.sockets import explain
@@ -29,7 +29,7 @@ TAKEN = 0.1
 """Seconds in which the controller takes a stop."""
 REPLY = 0.25
 """Seconds that a command waits for the reply to the one before."""
-LATE = 1.0
+WRITE_TIMEOUT = 1.0
 """Seconds after which a controller that takes nothing is lost."""
 STALE = 0.02
 """Seconds after the first flush in which what comes is of an earlier session."""
@@ -62,7 +62,7 @@ class Carrier(Protocol):
     def start(self, done: Done, broken: Broken) -> None:
         """Begin to report."""
 
-    def control(self, value: Control) -> int:
+    def control(self, value: UsbControl) -> int:
         """Begin a vendor request. Raises OSError."""
 
     def send(self, data: bytes) -> int:
@@ -116,11 +116,11 @@ class UsbPipe(Pipe):
     async def open(self) -> None:
         """Open the interface, flush it, and drop what comes until `start`. Raises OSError, TransportLost."""
         self._carrier.start(self._done, self._break)
-        for value in (Control.OPEN, Control.FLUSH):
+        for value in (UsbControl.OPEN, UsbControl.FLUSH):
             number = self._carrier.control(value)
             self._requests[number] = done = self._loop.create_future()
             try:
-                async with asyncio.timeout(LATE + self._carrier.delay):
+                async with asyncio.timeout(WRITE_TIMEOUT + self._carrier.delay):
                     status = await done
             except TimeoutError:
                 raise TransferFailed(TIMEOUT, "the controller does not take requests") from None
@@ -155,7 +155,7 @@ class UsbPipe(Pipe):
     @property
     def pending(self) -> int:
         with self._guard:
-            return sum(len(each) + 1 for each in self._queue) + len(self._partial)
+            return sum(len(frame) + 1 for frame in self._queue) + len(self._partial)
 
     def discard(self, whole: bool = False) -> int:
         """Drop what waits; what is written in the same turn of the loop is a stop. Returns 0: no command is cut."""
@@ -215,7 +215,7 @@ class UsbPipe(Pipe):
 
     def _send(self, commands: Iterable[bytes]) -> list[int]:
         """Begin to send each command; return the numbers."""
-        numbers = [self._begin_transfer(self._carrier.send, each + b"\0") for each in commands if each]
+        numbers = [self._begin_transfer(self._carrier.send, command + b"\0") for command in commands if command]
         self._sending.update(filter(None, numbers))
         self._owed += len(numbers)
         return numbers
@@ -230,7 +230,7 @@ class UsbPipe(Pipe):
             return
         number = self._flush() if self._owed else sum(self._send([self._queue.popleft()]))
         self._sent_at = now
-        self._loop.call_later(LATE + self._carrier.delay, self._late, number)
+        self._loop.call_later(WRITE_TIMEOUT + self._carrier.delay, self._late, number)
 
     def _go_on(self) -> None:
         with self._guard:
@@ -241,7 +241,7 @@ class UsbPipe(Pipe):
     def _flush(self) -> int:
         """Begin to empty the buffers; what comes until that is confirmed is dropped."""
         self._owed = 0
-        self._flushing = self._begin_transfer(self._carrier.control, Control.FLUSH)
+        self._flushing = self._begin_transfer(self._carrier.control, UsbControl.FLUSH)
         return self._flushing
 
     def _late(self, number: int) -> None:
@@ -304,9 +304,9 @@ class UsbPipe(Pipe):
     def _halt(self) -> None:
         with self._guard:
             self._queue.clear()
-        for each in self._requests.values():
-            if not each.done():
-                each.set_result(GONE)
+        for request in self._requests.values():
+            if not request.done():
+                request.set_result(GONE)
         self._carrier.halt()
 
     def _idle(self) -> bool:

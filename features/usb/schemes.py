@@ -74,7 +74,7 @@ class Usb(OnUsb):
             return [text]
         from multidrop.features.usb.controllers import list_controllers
 
-        return [each.url for each in list_controllers()] or [text]
+        return [controller.url for controller in list_controllers()] or [text]
 
 
 class Usbip(OnUsb):

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from multidrop.features.usb.interface import IN, MODULE, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, Control
+from multidrop.features.usb.interface import IN, MODULE, OUT, PACKET, PRODUCT, REQUEST, REQUEST_TYPE, VENDOR, UsbControl
 from multidrop.features.usb.pipe import Broken, Done, TransferFailed
 from multidrop.transports import Unreachable
 from multidrop.transports.sockets import connected, explain, host_port
@@ -32,7 +32,7 @@ REFUSALS = {1: "it is not exported", 2: "another program has it", 3: "it has an 
 """The status of a refused import."""
 ANSWER = 3.0
 """Seconds in which a server answers an operation."""
-PAUSE = 0.002
+WRITE_RETRY_PAUSE = 0.002
 """Seconds after which what the system did not take is sent."""
 _DEVICE = struct.Struct(">256s32sIIIHHHBBBBBB")
 _HEADER = struct.Struct(">IIIII28s")
@@ -116,8 +116,8 @@ class Transfers:
     def feed(self, data: bytes) -> Iterator[Transfer]:
         """Take bytes; yield whole messages. Raises Malformed."""
         self._buffer += data
-        while (found := self._one()) is not None:
-            yield found
+        while (transfer := self._one()) is not None:
+            yield transfer
 
     def _one(self) -> Transfer | None:
         if len(self._buffer) < _HEADER.size:
@@ -155,7 +155,7 @@ def operation(code: int, status: int = 0, rest: bytes = b"") -> bytes:
     return OPERATION.pack(VERSION, code, status) + rest
 
 
-def setup(value: Control) -> bytes:
+def setup(value: UsbControl) -> bytes:
     """The setup packet of a vendor request."""
     return struct.pack("<BBHHH", REQUEST_TYPE, REQUEST, value, 0, 0)
 
@@ -224,7 +224,7 @@ class UsbipCarrier:
         self._done, self._broken = done, broken
         self._reading = self._loop.create_task(self._read())
 
-    def control(self, value: Control) -> int:
+    def control(self, value: UsbControl) -> int:
         return self._submit(0, setup=setup(value))
 
     async def number(self) -> str:
@@ -240,9 +240,9 @@ class UsbipCarrier:
     async def _descriptor(self, value: int, language: int) -> bytes:
         """A descriptor by type and index; empty where the device has none."""
         number = self._submit(0x80, setup=struct.pack("<BBHHH", 0x80, 6, value, language, PACKET))
-        found: asyncio.Future[bytes] = self._loop.create_future()
-        self._described[number] = found
-        return await found
+        future: asyncio.Future[bytes] = self._loop.create_future()
+        self._described[number] = future
+        return await future
 
     def send(self, data: bytes) -> int:
         return self._submit(OUT, data=data)
@@ -263,7 +263,7 @@ class UsbipCarrier:
 
     def close(self) -> None:
         with contextlib.suppress(OSError):
-            self.control(Control.CLOSE)
+            self.control(UsbControl.CLOSE)
         self._socket.close()
 
     def _submit(self, endpoint: int, setup: bytes = bytes(8), data: bytes = b"") -> int:
@@ -291,20 +291,22 @@ class UsbipCarrier:
         with self._guard, contextlib.suppress(OSError):  # the reader reports a break
             self._push()
             if self._unsent:
-                self._loop.call_later(PAUSE, self._send_rest)
+                self._loop.call_later(WRITE_RETRY_PAUSE, self._send_rest)
 
     async def _read(self) -> None:
         try:
             while data := await self._loop.sock_recv(self._socket, 4096):
-                for each in self._messages.feed(data):
-                    if (described := self._described.pop(each.number, None)) is not None:
+                for transfer in self._messages.feed(data):
+                    if (described := self._described.pop(transfer.number, None)) is not None:
                         if not described.done():
-                            described.set_result(each.data if each.status == 0 else b"")
-                    elif each.kind == RET_SUBMIT:
-                        self._done(each.number, each.status, each.data)
-                    elif (number := self._cancelled.pop(each.number, 0)) and each.status:  # 0: it had ended before
+                            described.set_result(transfer.data if transfer.status == 0 else b"")
+                    elif transfer.kind == RET_SUBMIT:
+                        self._done(transfer.number, transfer.status, transfer.data)
+                    elif (
+                        number := self._cancelled.pop(transfer.number, 0)
+                    ) and transfer.status:  # 0: it had ended before
                         self._messages.asked.pop(number, None)
-                        self._done(number, each.status, b"")
+                        self._done(number, transfer.status, b"")
                 await asyncio.sleep(0)  # a server that sends without a pause does not hold up the loop
             self._broken(None)
         except Malformed as error:

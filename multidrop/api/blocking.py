@@ -24,9 +24,9 @@ from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
-from multidrop.api.threads import Ended, LoopThread, Notices
+from multidrop.api.threads import LoopEnded, LoopThread, Notices
 from multidrop.base.errors import Diagnostic
-from multidrop.drives.telemetry import PERIOD
+from multidrop.drives.telemetry import WATCH_PERIOD
 from multidrop.shell.events import FAILURES
 
 P = ParamSpec("P")
@@ -39,23 +39,23 @@ def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> C
 
     def call(self: Any, /, *arguments: P.args, **named: P.kwargs) -> T:
         __tracebackhide__ = True
-        found: T = self._call(lambda: method(self._awaited, *arguments, **named))
-        return found
+        result: T = self._call(lambda: method(self._awaited, *arguments, **named))
+        return result
 
     return update_wrapper(call, method, ("__doc__", "__name__", "__annotations__"), ())
 
 
-class Reading(Generic[T]):
+class ReadProperty(Generic[T]):
     """A property that reads now, made from an awaited method, for an object with `_awaited` and `_call`."""
 
     def __init__(self, method: Callable[[Any], Coroutine[Any, Any, T]]) -> None:
         self._method, self.__doc__ = method, method.__doc__
 
     @overload
-    def __get__(self, found: None, kind: type) -> Reading[T]: ...
+    def __get__(self, found: None, kind: type) -> ReadProperty[T]: ...
     @overload
     def __get__(self, found: Any, kind: type) -> T: ...
-    def __get__(self, found: Any, kind: type) -> T | Reading[T]:
+    def __get__(self, found: Any, kind: type) -> T | ReadProperty[T]:
         return self if found is None else found._call(lambda: self._method(found._awaited))
 
     if TYPE_CHECKING:
@@ -133,7 +133,7 @@ class Session(Fixed):
             return future.result()
         except FAILURES as error:
             raise error.with_traceback(None) from None
-        except (Ended, concurrent.futures.CancelledError):
+        except (LoopEnded, concurrent.futures.CancelledError):
             if self._thread.alive:
                 raise
             raise Diagnostic(*CLOSED) from None  # by another thread, meanwhile
@@ -144,7 +144,7 @@ class Session(Fixed):
 
     def _break_off(self) -> None:
         """Stop what this session started; it stays open."""
-        with contextlib.suppress(Diagnostic, Ended):
+        with contextlib.suppress(Diagnostic, LoopEnded):
             self._thread.begin(self._awaited._break_off()).result()
 
     def _run_there(self, function: Callable[[], T]) -> T:
@@ -188,7 +188,7 @@ class Session(Fixed):
         """
         return live(self.telemetry(*addresses, rate=rate))
 
-    def events(self, *addresses: str, every: float = PERIOD) -> Events:
+    def events(self, *addresses: str, every: float = WATCH_PERIOD) -> Events:
         """Iterate over what happens to drives (all without an address) and their lines: see `Event`.
 
         `every`: seconds between two readings of a drive.
@@ -261,14 +261,14 @@ class Drive(_OfSession, DriveFacts):
     set_output = blocking(AsyncDrive.set_output)
     read_error = blocking(AsyncDrive.read_error)
 
-    position = Reading(AsyncDrive.position)
-    velocity = Reading(AsyncDrive.velocity)
-    moving = Reading(AsyncDrive.moving)
-    motion = Reading(AsyncDrive.motion)
-    homed = Reading(AsyncDrive.homed)
-    error = Reading(AsyncDrive.error)
-    inputs = Reading(AsyncDrive.inputs)
-    limits = Reading(AsyncDrive.limits)
+    position = ReadProperty(AsyncDrive.position)
+    velocity = ReadProperty(AsyncDrive.velocity)
+    moving = ReadProperty(AsyncDrive.moving)
+    motion = ReadProperty(AsyncDrive.motion)
+    homed = ReadProperty(AsyncDrive.homed)
+    error = ReadProperty(AsyncDrive.error)
+    inputs = ReadProperty(AsyncDrive.inputs)
+    limits = ReadProperty(AsyncDrive.limits)
 
     def stop(self) -> StopReport:
         """Stop this drive now; return what is known of it then. It refuses nothing afterwards."""

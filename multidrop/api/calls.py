@@ -20,7 +20,7 @@ from multidrop.base.errors import Diagnostic, Stopped, TransportLost
 from multidrop.drives.conversations import refuse_stranger
 from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report
-from multidrop.shell.automation import ENDING, outcome, settled
+from multidrop.shell.automation import END_TIMEOUT, outcome, settled
 from multidrop.shell.events import FAILURES, By
 from multidrop.shell.origin import Origin
 from multidrop.shell.session import Session
@@ -45,11 +45,11 @@ def lost(error: TransportLost) -> TransportLost:
     if isinstance(error, Unreachable | Lost):
         return error
     known = error.unproven or error.executed
-    found = Lost(str(error) if known else f"{error}; no command of this call is in doubt")
-    found.unproven, found.executed = error.unproven, error.executed
+    lost = Lost(str(error) if known else f"{error}; no command of this call is in doubt")
+    lost.unproven, lost.executed = error.unproven, error.executed
     for note in getattr(error, "__notes__", ()):
-        found.add_note(note)
-    return found
+        lost.add_note(note)
+    return lost
 
 
 class Calls:
@@ -100,8 +100,8 @@ class Calls:
     def closed(self) -> Session:
         """End all telemetry, and give the session up."""
         shell, self._shell = self.shell, None
-        for each in self._streams:
-            each.close()
+        for stream in self._streams:
+            stream.close()
         if self.returns is not None:
             self.returns.close()
         return shell
@@ -172,7 +172,7 @@ class Calls:
         self._going = False
         self.shell.interrupt()
         if self._tasks:  # a macro executes its `on_early_end` lines
-            await asyncio.wait([*self._tasks], timeout=ENDING)
+            await asyncio.wait([*self._tasks], timeout=END_TIMEOUT)
         await self._end(early=True)
         every = self.shell.automations.interrupted
         halts, self._reported = every[self._reported :], len(every)
@@ -208,10 +208,10 @@ class StopReport:
         return self.text
 
 
-class Stopping:
+class WrittenStop:
     """A stop that is written. Await it for its report; it works without that, too."""
 
-    def __init__(self, shell: Session, tally: Callable[[], stop_report.Tally]) -> None:
+    def __init__(self, shell: Session, tally: Callable[[], stop_report.FateTally]) -> None:
         self._shell, self._tally = shell, tally
 
     def __await__(self) -> Generator[Any, None, StopReport]:

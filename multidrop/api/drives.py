@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
-from multidrop.api.calls import Calls, Stopping
+from multidrop.api.calls import Calls, WrittenStop
 from multidrop.api.events import Fault, fault_of
 from multidrop.api.fixed import Fixed
 from multidrop.api.notebooks import picture
@@ -26,7 +26,7 @@ from multidrop.drives.drive import still
 from multidrop.shell import stop_report, waits
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.origin import Origin
-from multidrop.shell.scripts.expression import Value, Word
+from multidrop.shell.scripts.expression import DriveQuestion, Value
 from multidrop.shell.scripts.questions import ask
 from multidrop.shell.workspace import address_of
 
@@ -75,14 +75,14 @@ async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
     ]:
         part = left[0]
         asked.add(part.name)
-        found, at = drive.settings.get(part.name, ({}, -1)) if part.slow else ({}, -1)
+        values, at = drive.settings.get(part.name, ({}, -1)) if part.slow else ({}, -1)
         if at != drive.commands:
             commands = drive.commands
             with contextlib.suppress(Refused):
-                found = await drive.run(part.read())
+                values = await drive.run(part.read())
                 if part.slow:
-                    drive.settings[part.name] = (found, commands)
-        facts.update(found)
+                    drive.settings[part.name] = (values, commands)
+        facts.update(values)
     if not asked:
         raise Inexpressible(f"{drive.shown}: its state is not asked for as it is set to reply (EM=3)")
     return drive.family.values.fold(facts)
@@ -148,11 +148,11 @@ def _first(drive: DriveFacts) -> str:
 
 def _of_axis(drive: DriveFacts, axes: Sequence[A]) -> A:
     wanted = drive.axis.lower()
-    found = next((each for each in axes if wanted in ("", each.axis.lower())), None)
-    if found is None:
-        names = ", ".join(each.axis for each in axes if each.axis)
+    motion = next((axis for axis in axes if wanted in ("", axis.axis.lower())), None)
+    if motion is None:
+        names = ", ".join(axis.axis for axis in axes if axis.axis)
         raise Diagnostic(f"no axis {drive.axis}", drive.name, f"valid: {names}" if names else "it has one axis")
-    return found
+    return motion
 
 
 async def _homing_ended(calls: Calls, drive: Drive, axis: str) -> bool:
@@ -190,7 +190,7 @@ class AsyncDrive(DriveFacts):
         """
         name = self._drive.family.values.actions.word(str(name), self.axis)
         line = name.startswith("[") and name.endswith("]")
-        word = Word(name[1:-1] if line else name, self._target, line)
+        word = DriveQuestion(name[1:-1] if line else name, self._target, line)
         shell = self._calls.shell
         if not line and not _WORD.fullmatch(name):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
@@ -239,7 +239,7 @@ class AsyncDrive(DriveFacts):
             if drive.commands == commands and "=" not in "".join(lines):  # a move changes no setting
                 drive.settings |= {name: (drive.settings[name][0], commands) for name in kept}
 
-    async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
+    async def wait(self, timeout: float = waits.WAIT_TIMEOUT, *, idle: bool = False) -> None:
         """Wait until two readings show it at rest; with `idle` also until no program runs.
 
         Raises MotionFailed where its last motion of this session did not end as it should, Timeout after `timeout`
@@ -247,14 +247,14 @@ class AsyncDrive(DriveFacts):
         """
         drive, shell, timeout = self._drive, self._calls.shell, seconds(timeout, "wait")
         await self._calls.run(lambda origin: waits.wait(shell, origin, timeout, idle=idle, drives=[drive], said="wait"))
-        for axis in [each for each in drive.homings if each not in drive.homed]:
+        for axis in [homing for homing in drive.homings if homing not in drive.homed]:
             well = await _homing_ended(self._calls, drive, axis)
             if not (well or self._drive.family.values.actions.no_error) and await self.error() is not None:
                 raise DriveError(f"{self.name}: the homing has ended with an error; read_error() reads and clears it")
         if self._calls.returns is not None:
             await self.motion()
 
-    async def wait_for(self, condition: str, timeout: float = waits.LIMIT) -> None:
+    async def wait_for(self, condition: str, timeout: float = waits.WAIT_TIMEOUT) -> None:
         """Wait until the drive reports a value: `I1=1`, `P>=51200`, `P > {10 mm}`.
 
         Raises MotionFailed once a motion of this session has failed, Timeout, Diagnostic.
@@ -336,20 +336,20 @@ class AsyncDrive(DriveFacts):
 
     async def inputs(self) -> dict[int | str, bool]:
         """Read the inputs: True is active. By number, and by function where they have one: `home`, `lim+`, `lim-`."""
-        found: dict[int | str, bool] = {}
+        levels: dict[int | str, bool] = {}
         for lamp in (await self._conditions()).lamps:
             if not lamp.output and lamp.on is not None:
-                found |= {int(lamp.name): lamp.on} if lamp.name.isdigit() else {}
-                found |= {lamp.function: lamp.on} if lamp.function else {}
+                levels |= {int(lamp.name): lamp.on} if lamp.name.isdigit() else {}
+                levels |= {lamp.function: lamp.on} if lamp.function else {}
         for number, line in self._drive.family.values.actions.ports().items():
-            found[number] = bool(await self.read(f"[{line}]"))
-        return found
+            levels[number] = bool(await self.read(f"[{line}]"))
+        return levels
 
     async def limits(self) -> Limits:
         """Read the limit switches, and the travel between software limits."""
-        found = await self._conditions()
-        on = {lamp.function: lamp.on for lamp in found.lamps if not lamp.output}
-        return Limits(on.get("lim-"), on.get("lim+"), found.limits)
+        conditions = await self._conditions()
+        on = {lamp.function: lamp.on for lamp in conditions.lamps if not lamp.output}
+        return Limits(on.get("lim-"), on.get("lim+"), conditions.limits)
 
     async def error(self) -> Fault | None:
         """Read what is known of its error and leave it set; None: there is none. `read_error` has its number.
@@ -362,17 +362,17 @@ class AsyncDrive(DriveFacts):
 
     async def read_error(self) -> Fault | None:
         """Read the error **and clear it**; None: there was none. Raises as `error`."""
-        found, actions = None, self._drive.family.values.actions
+        fault, actions = None, self._drive.family.values.actions
         if not actions.error:
-            found = await self.error()
+            fault = await self.error()
         elif code := await self.read(actions.error):
             text = f"error {code}"
             with contextlib.suppress(Diagnostic):
                 text = self._drive.family.language.describe_error(int(code), self.product)[0]
-            found = Fault(int(code), text)
-        if found is not None and (clear := actions.clear(_first(self))):
+            fault = Fault(int(code), text)
+        if fault is not None and (clear := actions.clear(_first(self))):
             await self._calls.run(lambda origin: self._send(origin, clear))
-        return found
+        return fault
 
     async def _conditions(self, slow: bool = True) -> Conditions:
         self._check_executes()
@@ -409,9 +409,9 @@ class AsyncDrive(DriveFacts):
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""
         self._check_executes()
-        found = _of_axis(self, await self._calls.run(lambda origin: self._drive.motion()))
+        motion = _of_axis(self, await self._calls.run(lambda origin: self._drive.motion()))
         self._axis_known = True
-        return found
+        return motion
 
     def _check_executes(self) -> None:
         """Raise Refused in program mode, where the drive would store a line or a question."""
@@ -420,13 +420,13 @@ class AsyncDrive(DriveFacts):
 
     # Stop, samples
 
-    def stop(self) -> Stopping:
+    def stop(self) -> WrittenStop:
         """Stop this drive now; await what is returned for the report. It refuses nothing afterwards."""
         shell = self._calls.shell
         halt = shell.bus(self._drive.link.name).stop([self._drive])
         self._drive.motions.stopped(None)
         several = len(shell.buses) > 1
-        return Stopping(shell, lambda: stop_report.of_halts([halt], shell.wall(halt.at), several))
+        return WrittenStop(shell, lambda: stop_report.of_halts([halt], shell.wall(halt.at), several))
 
     def telemetry(self, rate: float = 50.0) -> AsyncTelemetry:
         """Read position and velocity `rate` times a second at most, as an iterator of samples."""

@@ -50,9 +50,9 @@ def closed(session: object) -> None:
     flush_printed()
     _open.pop(session, None)
     if not _open and threading.current_thread() is threading.main_thread():
-        for each, before in _handled.items():
-            if signal.getsignal(each) is _exit:
-                signal.signal(each, before)
+        for number, before in _handled.items():
+            if signal.getsignal(number) is _exit:
+                signal.signal(number, before)
         if signal.SIGTERM in _handled:
             stdout.work_done()
             stdout.watch = None

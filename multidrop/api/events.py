@@ -70,7 +70,7 @@ class AsyncEvents(AsyncStream[Event]):
         super().__init__(
             shell,
             [
-                shell.buses[bus].telemetry.watch([own for each, own in self._drives if each == bus], every)
+                shell.buses[bus].telemetry.watch([own for name, own in self._drives if name == bus], every)
                 for bus in buses
             ],
         )
@@ -82,8 +82,8 @@ class AsyncEvents(AsyncStream[Event]):
         if isinstance(event.event, Conditioned):
             drive = self._drives.get((event.bus, event.event.address))
             if drive is not None:
-                for each in event.event.conditions:
-                    self._compare(f"{address_of(self._shell, drive)} {each.axis}".strip(), each)
+                for condition in event.event.conditions:
+                    self._compare(f"{address_of(self._shell, drive)} {condition.axis}".strip(), condition)
         elif isinstance(event.event, Lost):
             self._away.add(event.bus)
             self._publish("lost", event.bus, str(event.event.error))
@@ -96,15 +96,15 @@ class AsyncEvents(AsyncStream[Event]):
     def _compare(self, name: str, now: Conditions) -> None:
         """Publish what is new: a limit, an error, the end of a program."""
         limits = [LIMITS[lamp.function] for lamp in now.lamps if lamp.on and lamp.function in LIMITS]
-        found: dict[tuple[Kind, str], str] = {("limit", limit): limit for limit in limits}
+        kinds: dict[tuple[Kind, str], str] = {("limit", limit): limit for limit in limits}
         if (fault := fault_of(now)) is not None:
-            found["error", str(fault.code)] = fault.text  # the same error, whatever more is known of it later
-        for (kind, which), text in sorted(found.items()):
+            kinds["error", str(fault.code)] = fault.text  # the same error, whatever more is known of it later
+        for (kind, which), text in sorted(kinds.items()):
             if (kind, which) not in self._state.get(name, frozenset()):
                 self._publish(kind, name, text)
         if not now.program and (ended := self._running.get(name)):
             self._publish("program ended", name, f"its program has ended ({ended})")
-        self._state[name], self._running[name] = frozenset(found), now.program
+        self._state[name], self._running[name] = frozenset(kinds), now.program
 
     def _publish(self, kind: Kind, name: str, text: str) -> None:
         self._add(Event(kind, name, text, self._shell.wall(self._shell.now()).timestamp()))

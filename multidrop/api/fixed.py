@@ -21,8 +21,8 @@ class Fixed:
             if name.startswith("_") or (name in self._own and name not in vars(self)):
                 return super().__setattr__(name, value)
             kind = type(self)
-            ours = [each for each in kind.__mro__ if each.__module__.startswith("multidrop.")]
-            known = name in self._own or any(name in vars(each) for each in ours)
+            ours = [parent for parent in kind.__mro__ if parent.__module__.startswith("multidrop.")]
+            known = name in self._own or any(name in vars(our) for our in ours)
             if not known and kind not in ours:
                 return super().__setattr__(name, value)
             what = "cannot be set" if known else "does not exist, and cannot be set"

@@ -36,10 +36,10 @@ def picture(kind: str, found: object) -> str | None:
     """The HTML of an object; None where no feature draws it, or it cannot: the notebook shows its text then."""
     import logging
 
-    for each in registry.added(Pictures):
-        if kind in each.html:
+    for pictures in registry.added(Pictures):
+        if kind in pictures.html:
             try:
-                return each.html[kind](found)
+                return pictures.html[kind](found)
             except Diagnostic as failure:
                 logging.getLogger("multidrop").warning("%s", failure)
                 return None

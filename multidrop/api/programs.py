@@ -87,15 +87,15 @@ class AsyncParameters(Fixed):
     async def backup(self, file: str) -> Readings:
         """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
         new_file.check(file)
-        found = await self.read()
-        new_file.write(file, backup_text(self._drive, found))
-        return found
+        readings = await self.read()
+        new_file.write(file, backup_text(self._drive, readings))
+        return readings
 
     async def diff(self, file: str = "") -> list[Difference]:
         """Compare with a file, or without one with the defaults: (name, value here, value there)."""
         there = files.load(file) if file else None
-        found = await self.read()
-        return differences(found, there, self._calls.shell.display_name(self._drive))
+        readings = await self.read()
+        return differences(readings, there, self._calls.shell.display_name(self._drive))
 
     async def restore(
         self,

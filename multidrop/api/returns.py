@@ -25,13 +25,13 @@ from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
 
 NEVER = float("-inf")
-PAUSE = 0.25
+LOOK_PERIOD = 0.25
 """The time between two looks for drives to read, s."""
 UNKNOWN = "a command was too recent, when its line was lost, to tell whether it is as it was"
 MOVED = "it moved, or a program ran in it, when it was last read before its line was lost, so its position is not known"
 
 
-class Known(NamedTuple):
+class KnownDrive(NamedTuple):
     """What was known of a drive when its line was lost."""
 
     identity: Mapping[str, Value]
@@ -55,7 +55,7 @@ class Returns:
 
     def __init__(self, shell: Session) -> None:
         self._shell = shell
-        self._lost: dict[Bus, dict[Drive, Known]] = {}
+        self._lost: dict[Bus, dict[Drive, KnownDrive]] = {}
         self._tasks: dict[Bus, asyncio.Task[None]] = {}
         self._refused: set[tuple[Drive, str]] = set()
         """Parts that a drive refuses: each refusal may start a subroutine for errors in it."""
@@ -85,7 +85,7 @@ class Returns:
 
     async def _settings(self, drive: Drive, *, every: bool = False) -> dict[str, Value]:
         """Read the settings of a drive, and with `every` all of its conditions. Raises NoAnswer."""
-        found = dict[str, Value]()
+        values = dict[str, Value]()
         for part in drive.family.values.parts({}):
             if (part.slow or every) and (drive, part.name) not in self._refused:
                 commands = drive.commands
@@ -96,12 +96,12 @@ class Returns:
                     continue
                 if part.slow:
                     drive.settings[part.name] = facts, commands
-                    found |= facts
+                    values |= facts
         if every:
             self._programs_read.add(drive)
-        return found
+        return values
 
-    def _known(self, drive: Drive) -> Known:
+    def _known(self, drive: Drive) -> KnownDrive:
         parts = [part.name for part in drive.family.values.parts({}) if part.slow]
         parts = [name for name in parts if (drive, name) not in self._refused]
         current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
@@ -112,7 +112,7 @@ class Returns:
         positions = drive.rested
         if not commanded and not self._ran_program(drive):
             positions = positions or places
-        return Known(_identity(drive), positions, settings, commanded, read=at > NEVER)
+        return KnownDrive(_identity(drive), positions, settings, commanded, read=at > NEVER)
 
     def _ran_program(self, drive: Drive) -> bool:
         """Whether a drive has shown that a program runs; false where that is only a guess."""
@@ -126,7 +126,7 @@ class Returns:
                     if not (drive.programming or drive.transferring or drive.state.settings_unknown):
                         with isolated(f"reading {drive.shown}"), contextlib.suppress(DriveError, TransportLost):
                             await self.note(drive)
-            await asyncio.sleep(PAUSE)
+            await asyncio.sleep(LOOK_PERIOD)
 
     def _take(self, event: SessionEvent) -> None:
         bus = self._shell.buses.get(event.bus) if isinstance(event, OnBus) else None
@@ -155,7 +155,7 @@ class Returns:
                 self._shell.notify(text, bus=bus.name, warning=True)
         del self._lost[bus]
 
-    async def _differences(self, bus: Bus, drive: Drive, before: Known) -> list[str]:
+    async def _differences(self, bus: Bus, drive: Drive, before: KnownDrive) -> list[str]:
         if drive not in bus.drives.values():
             return ["it has not replied since its line was lost"]
         try:
@@ -171,5 +171,5 @@ class Returns:
         identity = {name: value for name, value in _identity(drive).items() if before.identity[name]}
         now = {**identity, **(now if before.settings is not None else {}), **(places if was else {})}
         known = {name: value for name, value in before.identity.items() if value}
-        found = differing({**known, **(before.settings or {}), **was}, now)
-        return [f"{name.replace('_', ' ')} {old} before its line was lost, {new} now" for name, old, new in found]
+        differences = differing({**known, **(before.settings or {}), **was}, now)
+        return [f"{name.replace('_', ' ')} {old} before its line was lost, {new} now" for name, old, new in differences]

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, TypeVar
 
 from multidrop.api import endings
-from multidrop.api.calls import Calls, Stopping
+from multidrop.api.calls import Calls, WrittenStop
 from multidrop.api.drives import AsyncDrive
 from multidrop.api.events import AsyncEvents
 from multidrop.api.fixed import Fixed
@@ -21,7 +21,7 @@ from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.api.values import seconds, text_of
 from multidrop.base.errors import Diagnostic, DriveError, Timeout, TransportLost
 from multidrop.base.isolation import isolated
-from multidrop.drives.telemetry import PERIOD
+from multidrop.drives.telemetry import WATCH_PERIOD
 from multidrop.shell import stop_report, waits
 from multidrop.shell.automation import settled
 from multidrop.shell.channel import Front
@@ -31,7 +31,7 @@ from multidrop.shell.session import Session as Shell
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.scripts.model import Result
+    from multidrop.shell.scripts.model import LineResult
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Run:
     """A script that was executed to its end."""
 
     file: str
-    results: tuple[Result, ...]
+    results: tuple[LineResult, ...]
     """The result of each line; lines that only steer have none."""
 
     @property
@@ -147,7 +147,7 @@ class AsyncSession(Fixed):
     async def _note(self, returns: Returns, drive: Drive) -> None:
         await self._calls.run(lambda origin: returns.note(drive))
 
-    async def wait_back(self, timeout: float = waits.LIMIT) -> None:
+    async def wait_back(self, timeout: float = waits.WAIT_TIMEOUT) -> None:
         """Wait until every lost connection is back. Raises Timeout, and Lost where one is not tried again."""
         limit = seconds(timeout, "wait_back")
         await self._calls.run(lambda origin: self._back(limit))
@@ -164,7 +164,7 @@ class AsyncSession(Fixed):
                     raise TransportLost(f"{bus.link.loss}; connect(URL, reconnect=True) tries it again")
             if shell.now() >= deadline:
                 raise Timeout(f"wait_back: {names} still lost after {timeout:g} s")
-            await waits.sleep(waits.APART)
+            await waits.sleep(waits.READING_INTERVAL)
 
     async def close(self, *, stop: bool = False) -> None:
         """Close everything. Drives go on as they are, unless a `stop` is asked for. May be called again."""
@@ -240,7 +240,7 @@ class AsyncSession(Fixed):
 
         texts = {name: text_of(value, f"{name} of {file}") for name, value in values.items()}
         script = read_script(file, texts, self._shell.macros)
-        results: list[Result] = []
+        results: list[LineResult] = []
         await self._calls.run(lambda origin: run_script(self._shell, origin, script, results.append))
         return Run(file, tuple(results))
 
@@ -249,32 +249,32 @@ class AsyncSession(Fixed):
 
         A rate of `math.inf` is as fast as the line allows.
         """
-        drives = [self._found(each) for each in addresses] or [each._drive for each in self.drives]
+        drives = [self._found(address) for address in addresses] or [each._drive for each in self.drives]
         return self._calls.telemetry(drives, rate)
 
     # Stop
 
-    def stop(self) -> Stopping:
+    def stop(self) -> WrittenStop:
         """Stop every drive on every connection now; await what is returned for the report.
 
         It ends all calls with Stopped, and refuses further ones that send commands until `resume`.
         """
         shell = self._shell
         shell.stop("session.stop()")
-        return Stopping(shell, shell.tally)
+        return WrittenStop(shell, shell.tally)
 
     async def resume(self) -> None:
         """Let commands be sent again after a stop."""
         self._shell.resume()
 
-    def events(self, *addresses: str, every: float = PERIOD) -> AsyncEvents:
+    def events(self, *addresses: str, every: float = WATCH_PERIOD) -> AsyncEvents:
         """Iterate over what happens to drives (all without an address) and their lines: see `Event`.
 
         `every`: seconds between two readings of a drive.
         """
         if not (isinstance(every, (int, float)) and 0 < every < inf):  # with NaN nothing would ever be read
             raise Diagnostic(f"no period {every!r}", "events", "valid: above 0, in seconds")
-        drives = [self._found(each) for each in addresses] or [each._drive for each in self.drives]
+        drives = [self._found(address) for address in addresses] or [each._drive for each in self.drives]
         return self._calls.kept(AsyncEvents(self._shell, drives, every))
 
     def __repr__(self) -> str:

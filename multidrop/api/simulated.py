@@ -76,7 +76,9 @@ class SimulatedCell:
         """
         wanted = bus or self.buses[0]
         ways = {
-            _scheme(each.endpoint): each.endpoint.removeprefix("pty:") for each in self._served if each.bus == wanted
+            _scheme(served.endpoint): served.endpoint.removeprefix("pty:")
+            for served in self._served
+            if served.bus == wanted
         }
         if scheme not in ways:
             hint = f"valid: {', '.join(ways)}" if ways else f"its buses: {', '.join(self.buses)}"
@@ -107,12 +109,14 @@ def _read(file: str | os.PathLike[str], text: str) -> Cell:
 def _everywhere(bus: BusSpec, ethernet: bool) -> BusSpec:
     """Serve a bus in all ways that it can have."""
     schemes = ["tcp", *(own_ports() if ethernet else []), *([PTY] if sys.platform != "win32" else [])]
-    return bus._replace(serve=tuple(Endpoint(f"{each}:", each, HOST if each != PTY else "") for each in schemes))
+    return bus._replace(
+        serve=tuple(Endpoint(f"{scheme}:", scheme, HOST if scheme != PTY else "") for scheme in schemes)
+    )
 
 
 def _scheme(endpoint: str) -> str:
-    scheme, found, _ = endpoint.partition("://")
-    return scheme if found else PTY
+    scheme, chosen, _ = endpoint.partition("://")
+    return scheme if chosen else PTY
 
 
 def simulate(file: str | os.PathLike[str] = "", *, text: str = "", speed: float = 1.0) -> SimulatedCell:

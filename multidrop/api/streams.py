@@ -44,8 +44,8 @@ class AsyncStream(ABC, Generic[T]):
         if self._open:
             self._open = False
             self._leave()
-            for each in self._subscriptions:
-                each.close()
+            for subscription in self._subscriptions:
+                subscription.close()
             self._news.set()
 
     async def __aenter__(self: Self) -> Self:

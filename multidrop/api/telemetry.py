@@ -103,7 +103,7 @@ class Samples(Sequence[Sample]):
             columns["unit"] = [row.unit for row in self._rows]
             for name in ("place", "speed"):
                 values = (getattr(row, name) for row in self._rows)
-                columns[name] = array("d", (math.nan if each is None else each for each in values))
+                columns[name] = array("d", (math.nan if value is None else value for value in values))
         return columns
 
     def arrow(self, units: bool = False) -> Any:
@@ -126,7 +126,7 @@ class Samples(Sequence[Sample]):
 
 RATE = 50.0
 """Samples of each drive a second, at most."""
-KEPT = 200_000
+MOST_KEPT_SAMPLES = 200_000
 """The number of samples that wait to be taken; then the oldest are dropped."""
 
 
@@ -152,7 +152,7 @@ class AsyncTelemetry(AsyncStream[Sample]):
             return
         if isinstance(event.event, Read) and (event.bus, event.event.address) in self._names:
             self._add(self._sample(event.bus, event.event))
-            if len(self._rows) > KEPT:
+            if len(self._rows) > MOST_KEPT_SAMPLES:
                 self._rows.popleft()
                 self.missed += 1
         elif isinstance(event.event, Lost) and any(bus == event.bus for bus, _ in self._names):
@@ -160,12 +160,12 @@ class AsyncTelemetry(AsyncStream[Sample]):
 
     def _sample(self, bus: str, read: Read) -> Sample:
         at, wall = read.at - self._begun, self._shell.wall(read.at).timestamp()
-        found = Sample(at, wall, self._names[bus, read.address], read.axis, read.position, read.velocity)
+        sample = Sample(at, wall, self._names[bus, read.address], read.axis, read.position, read.velocity)
         drive = self._shell.buses[bus].drives.get(read.address) if self._shell.scaled else None
         if drive is None or (place := self._shell.units.given(drive, read.axis, read.position, Takes.PLACE)) is None:
-            return found
+            return sample
         speed = self._shell.units.given(drive, read.axis, read.velocity, Takes.VELOCITY)
-        return found.in_units(place[1], place[0], speed[0] if speed is not None else None)
+        return sample.in_units(place[1], place[0], speed[0] if speed is not None else None)
 
     async def samples(self) -> Samples:
         """Take all samples that have come and were not taken yet."""
@@ -178,5 +178,5 @@ def read_rrd(file: str | Path, *, twin: bool = False) -> Samples:
 
     Raises Diagnostic for another file, for one without such samples, and without rerun.
     """
-    found: Samples = plot_targets.needed("multidrop.read_rrd").read(file, twin)
-    return found
+    samples: Samples = plot_targets.needed("multidrop.read_rrd").read(file, twin)
+    return samples

@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 new_loop: Callable[[], asyncio.AbstractEventLoop] = asyncio.new_event_loop
-END = 5.0
+END_TIMEOUT = 5.0
 """The longest wait for the thread to end, s."""
 
 
-class Ended(RuntimeError):
+class LoopEnded(RuntimeError):
     """The loop has ended."""
 
 
@@ -54,7 +54,7 @@ class LoopThread:
             if not self._ended:
                 return asyncio.run_coroutine_threadsafe(work, self._loop)
         work.close()
-        raise Ended
+        raise LoopEnded
 
     def soon(self, function: Callable[[], object]) -> None:
         """Call a function in the loop, from any thread; an exception of it is the loop's."""
@@ -78,7 +78,7 @@ class LoopThread:
             with self._ending:
                 self._ended = True
                 self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join(END)
+            self._thread.join(END_TIMEOUT)
 
 
 class Notices:
@@ -95,9 +95,9 @@ class Notices:
         self._lines.put((text, warning))
 
     def end(self) -> None:
-        """Wait until all lines are passed on, END at most."""
+        """Wait until all lines are passed on, END_TIMEOUT at most."""
         self._lines.put(None)
-        self._thread.join(END)
+        self._thread.join(END_TIMEOUT)
 
     def _run(self) -> None:
         while (line := self._lines.get()) is not None:

@@ -17,8 +17,8 @@ def text_of(value: object, what: str) -> str:
     """Return the text of a value: a number without an exponent, True and False as 1 and 0. Raises Diagnostic."""
     if isinstance(value, str):
         return value
-    found = number_of(value, what)
-    return model.written(found) if isinstance(found, float) else str(found)
+    number = number_of(value, what)
+    return model.written(number) if isinstance(number, float) else str(number)
 
 
 def short_text_of(value: object, what: str) -> str:

@@ -60,10 +60,10 @@ def send(url: str, lines: Sequence[str], json: bool, agreeing: Agreeing) -> int:
     )
     if not json:
         return opened(partial(run_lines, lines=lines))
-    from multidrop.shell.batch.report import Report
+    from multidrop.shell.batch.report import BatchReport
     from multidrop.shell.scripts.executor import run_typed
 
-    report = Report("send", as_json=True)
+    report = BatchReport("send", as_json=True)
 
     async def body(session: Session) -> None:
         await run_typed(session, session.origin, lines, report.executed)
@@ -73,13 +73,13 @@ def send(url: str, lines: Sequence[str], json: bool, agreeing: Agreeing) -> int:
 
 def run(file: str, opening: Opening, reporting: Reporting, agreeing: Agreeing) -> int:
     from multidrop.macros import MacroStore
-    from multidrop.shell.batch.report import Report
+    from multidrop.shell.batch.report import BatchReport
     from multidrop.shell.configuration import Settings
     from multidrop.shell.scripts.reading import read_script
 
     if not (opening.on or opening.role):
         raise Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL")
-    report = Report(file, as_json=reporting.json, junit=reporting.junit)
+    report = BatchReport(file, as_json=reporting.json, junit=reporting.junit)
     try:
         report.begin()
         if file.endswith(".py"):
@@ -101,7 +101,7 @@ def run(file: str, opening: Opening, reporting: Reporting, agreeing: Agreeing) -
         with report.noting():
             await run_script(session, session.origin, script, report.executed)
 
-    tried = targets(each.text for each in lines_of(script.body))
+    tried = targets(line.text for line in lines_of(script.body))
     agreed, replies = agreeing.yes, not reporting.json
     code = runner.run([], body, agreed=agreed, beyond=agreeing.beyond, asks=False, replies=replies, tried=tried)
     return report.finish(code)
@@ -136,15 +136,15 @@ def help_(word: str, dialect: str | None) -> int:
     from multidrop.shell.verbs.explaining import explained, overview
 
     lines: list[str] = []
-    write(sys.stderr, *(f"warning: {each}" for each in load_others()))
+    write(sys.stderr, *(f"warning: {warning}" for warning in load_others()))
     if dialect:
         language = FAMILIES[dialect].language
         lines = language.describe_error(int(word[:9])) if _is_number(word) else language.describe(word)
     elif word:
-        having = [each for each in languages() if _has(each, word)]
+        having = [spoken for spoken in languages() if _has(spoken, word)]
         lines = explained(word, having[0] if having else None)
         others = {name: family.language for name, family in FAMILIES.items() if family.language in having[1:]}
-        same = [name for name, each in others.items() if explained(word, each) == lines]
+        same = [name for name, spoken in others.items() if explained(word, spoken) == lines]
         lines = [
             *lines,
             *(f"also: multidrop help {quote(word)} --dialect {each}" for each in others if each not in same),

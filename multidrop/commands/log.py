@@ -20,7 +20,7 @@ from multidrop.base.text import visible
 from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.log import files
-from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
+from multidrop.shell.log.files import KINDS, TRAFFIC, LogEntry, LogLine
 from multidrop.shell.raw import text_of
 from multidrop.shell.streams.stdout import lose, write
 
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 NOTHING_FOUND = 1
 STAMP = 23
 """The length of a time in a shown entry."""
-PERIOD = 0.1
+FOLLOW_PERIOD = 0.1
 """The time between two looks at a log that is followed, s."""
-LONGEST = 200
+LONGEST_JOINED_TEXT = 200
 """The bytes in one line, where no end of line came."""
-LAST = 10
+FIRST_SHOWN_ENTRIES = 10
 """The entries before the end with which following begins."""
 
 
@@ -49,31 +49,31 @@ def grep(expression: str, entries: Entries, ignore_case: bool) -> int:
     except re.error as problem:
         raise Diagnostic(f"{expression!r} is not a regular expression: {problem}", "log grep") from None
     wanted = _wanted(entries)
-    found = 0
+    hits = 0
 
-    def matching(entry: Entry) -> bool:
-        nonlocal found
+    def matching(entry: LogEntry) -> bool:
+        nonlocal hits
         matches = wanted(entry) and pattern.search(text(entry)) is not None
-        found += matches
+        hits += matches
         return matches
 
     code = reported(lambda: _print(files.whole(log_path(entries.file)), entries, matching))
-    return code or (0 if found else NOTHING_FOUND)
+    return code or (0 if hits else NOTHING_FOUND)
 
 
 def follow(entries: Entries) -> int:
     """Print the last lines of a log, and then what is added, until interrupted."""
     wanted = _wanted(entries)
 
-    def put(lines: Iterable[Line]) -> None:
+    def put(lines: Iterable[LogLine]) -> None:
         for line in lines if entries.json else joined(lines):
             _put(line, entries, wanted)
 
     def work() -> None:
         following = Following(log_path(entries.file))
-        put(list(following.look())[-LAST:])
+        put(list(following.look())[-FIRST_SHOWN_ENTRIES:])
         while True:
-            time.sleep(PERIOD)
+            time.sleep(FOLLOW_PERIOD)
             put(following.look())
 
     try:
@@ -96,19 +96,19 @@ def log_path(file: str) -> Path:
     return Path(file) if file else files.newest(configuration.load())
 
 
-def _wanted(entries: Entries) -> Callable[[Entry], bool]:
+def _wanted(entries: Entries) -> Callable[[LogEntry], bool]:
     """The filter of entries: by drive, and without polls unless all are asked for."""
     named = set(filter(None, entries.drive.split(",")))
     every = not named or "all" in named
 
-    def wanted(entry: Entry) -> bool:
+    def wanted(entry: LogEntry) -> bool:
         own = every or entry.drive in named or f"{entry.bus}:{entry.drive}" in named
         return (entries.all or not entry.poll) and own
 
     return wanted
 
 
-def _print(lines: Iterable[Line], entries: Entries, wanted: Callable[[Entry], bool]) -> None:
+def _print(lines: Iterable[LogLine], entries: Entries, wanted: Callable[[LogEntry], bool]) -> None:
     """Print the entries; report the lines that are none. Raises Diagnostic for a file without an entry."""
     known, wrong = 0, ""
     for line in lines if entries.json else joined(lines):
@@ -120,7 +120,7 @@ def _print(lines: Iterable[Line], entries: Entries, wanted: Callable[[Entry], bo
         raise Diagnostic("is not an entry of a session log", wrong, "a log of this version is one JSON object a line")
 
 
-def _put(line: Line, entries: Entries, wanted: Callable[[Entry], bool]) -> None:
+def _put(line: LogLine, entries: Entries, wanted: Callable[[LogEntry], bool]) -> None:
     if line.entry is None:
         if line.data.strip():
             write(sys.stderr, f"{line.where}: not a whole entry: {line.data[:80]!r}")
@@ -130,7 +130,7 @@ def _put(line: Line, entries: Entries, wanted: Callable[[Entry], bool]) -> None:
         sys.stdout.flush()
 
 
-def text(entry: Entry) -> str:
+def text(entry: LogEntry) -> str:
     """An entry in one line, its control characters written out."""
     stamp = f"{entry.time:%Y-%m-%d %H:%M:%S}.{entry.time.microsecond // 1000:03}"
     where, typed = join_target(entry.bus, entry.drive), entry.text
@@ -142,9 +142,9 @@ def text(entry: Entry) -> str:
     return f"{stamp} {KINDS[entry.kind]:<2} {where}{visible(typed, tabs=True)}"
 
 
-def joined(lines: Iterable[Line]) -> Iterator[Line]:
+def joined(lines: Iterable[LogLine]) -> Iterator[LogLine]:
     """Join the pieces of a reply that came one after the other, up to its end of line; the time is the first one's."""
-    held: Line | None = None
+    held: LogLine | None = None
     for line in lines:
         entry = line.entry
         if held is not None and not _continues(held.entry, entry):
@@ -160,10 +160,12 @@ def joined(lines: Iterable[Line]) -> Iterator[Line]:
         yield held
 
 
-def _continues(held: Entry | None, entry: Entry | None) -> bool:
+def _continues(held: LogEntry | None, entry: LogEntry | None) -> bool:
     if held is None or entry is None or entry.kind != "received" or held.text.endswith("\n"):
         return False
-    return (held.bus, held.drive, held.poll) == (entry.bus, entry.drive, entry.poll) and len(held.text) < LONGEST
+    return (held.bus, held.drive, held.poll) == (entry.bus, entry.drive, entry.poll) and len(
+        held.text
+    ) < LONGEST_JOINED_TEXT
 
 
 class Following:
@@ -177,11 +179,11 @@ class Following:
         self.lost = False
         """Parts were removed before they were read."""
 
-    def look(self) -> Iterator[Line]:
+    def look(self) -> Iterator[LogLine]:
         """Yield the whole lines since the last look. Raises Diagnostic where the log cannot be read."""
         try:
             parts = files.parts(self._path)
-            firsts = [_first(each) for each in parts]
+            firsts = [_first(part) for part in parts]
             if self._file in firsts:
                 parts = parts[firsts.index(self._file) :]
             else:

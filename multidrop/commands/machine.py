@@ -41,9 +41,9 @@ def not_in_force(found: Settings) -> str:
     guards = found.guards
     parts = [f"the guards on {', '.join(sorted(guards.also))}"] if guards.also else []
     parts += [f"'off' of the guards {', '.join(sorted(guards.off))}"] if guards.off else []
-    for name, each in found.connections.items():
-        parts += [f"the names of {name}"] if each.names else []
-        parts += [f"the units of {name}"] if each.units else []
+    for name, connection in found.connections.items():
+        parts += [f"the names of {name}"] if connection.names else []
+        parts += [f"the units of {name}"] if connection.units else []
     parts += [f"what has errors in the file: {len(found.problems)}"] if found.problems else []
     return ", ".join(parts)
 
@@ -55,8 +55,8 @@ def path() -> int:
 
 def show() -> int:
     """Print every setting as TOML; a remark marks those that the file does not set."""
-    found = configuration.load()
-    for line in shown(found, _keys(found), _text(places.config_file())):
+    settings = configuration.load()
+    for line in shown(settings, _keys(settings), _text(places.config_file())):
         write(sys.stdout, line)
     return 0
 
@@ -75,11 +75,11 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
         return ["", f"[{table}]", *(f"{key} = {tomlkit.item(values[key]).as_string()}{remarks[key]}" for key in values)]
 
     lines = [f"# {places.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
-    for name, each in found.connections.items():
-        url = url_without_secrets(each.url) if holds_password(each.url) else each.url
+    for name, connection in found.connections.items():
+        url = url_without_secrets(connection.url) if holds_password(connection.url) else connection.url
         lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(url).as_string()}"]
-        if each.names:
-            names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in each.names.items())
+        if connection.names:
+            names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in connection.names.items())
             lines.append(f"names = {{ {names} }}")
     look, log, guards = found.look, found.log, found.guards
     wrong = {"theme"} if wrong_theme(look.theme) else set[str]()
@@ -87,7 +87,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
     lines += rows("screen", {"theme": theme, "signs": look.signs, "times": look.times}, wrong)
     lines += rows("keys", keys, {name for name, text in look.keys.items() if keys.get(name) != text})
     lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
-    tables = {name: each.shown(found.section(name)) for name, each in sections().items()}
+    tables = {name: section.shown(found.section(name)) for name, section in sections().items()}
     tables["simulator"] = {"allow": list(map(str, found.allowed))}
     for name, values in sorted(tables.items()):
         lines += rows(name, values)
@@ -96,16 +96,16 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 
 def check() -> int:
     """Report what is wrong; exit code 0 if nothing is."""
-    found = configuration.load(lenient=True)
+    settings = configuration.load(lenient=True)
     text = _text(places.config_file())
     from multidrop.tui.app import look_troubles
 
-    troubles = look_troubles(found, text, str(places.config_file()))
-    write(sys.stderr, *map(str, (*found.problems, *troubles)))
-    if not (troubles or found.problems):
+    troubles = look_troubles(settings, text, str(places.config_file()))
+    write(sys.stderr, *map(str, (*settings.problems, *troubles)))
+    if not (troubles or settings.problems):
         state = "is right" if text else "does not exist: all settings are the defaults"
         write(sys.stdout, f"{places.config_file()} {state}")
-    return WRONG if troubles or found.problems else 0
+    return WRONG if troubles or settings.problems else 0
 
 
 def _keys(found: Settings) -> dict[str, str]:
@@ -124,7 +124,7 @@ def _text(file: Path) -> str:
 TERMINAL = ("TERM", "COLORTERM", "TERM_PROGRAM", "LANG", "LC_ALL", "LC_CTYPE", "NO_COLOR", "PYTHONUTF8")
 PRESENT = ("SSH_CONNECTION", "TMUX", "STY")
 """Variables of which only the presence matters: they hold addresses and paths."""
-LONGEST = 200
+MOST_LISTED_LINES = 200
 """Lines of a file in the report; the rest is counted."""
 
 
@@ -184,10 +184,10 @@ def _packages() -> Iterator[str]:
         name = need.partition(";")[0].split("<")[0].split(">")[0].split("=")[0].split("[")[0].strip()
         extra = need.partition("extra ==")[2].strip(" '\"")
         try:
-            found = version(name)
+            installed = version(name)
         except PackageNotFoundError:
-            found = "not installed"
-        yield f"{name} {found}" + (f" (extra {extra})" if extra else "")
+            installed = "not installed"
+        yield f"{name} {installed}" + (f" (extra {extra})" if extra else "")
 
 
 def _terminal() -> Iterator[str]:
@@ -220,9 +220,9 @@ def _configuration() -> Iterator[str]:
     except Diagnostic as problem:
         yield f"problem: {problem}"
     else:
-        yield from lines[:LONGEST]
-        if len(lines) > LONGEST:
-            yield f"... {len(lines) - LONGEST} more lines"
+        yield from lines[:MOST_LISTED_LINES]
+        if len(lines) > MOST_LISTED_LINES:
+            yield f"... {len(lines) - MOST_LISTED_LINES} more lines"
     try:
         yield from (f"problem: {problem}" for problem in configuration.load(lenient=True).problems)
     except Diagnostic as problem:
@@ -250,10 +250,10 @@ def _macros() -> Iterator[str]:
 def _ports() -> Iterator[str]:
     from multidrop.shell.connect.schemes import local_ports
 
-    found = [*local_ports()]
-    for port in found:
+    ports_there = [*local_ports()]
+    for port in ports_there:
         yield "  ".join(part for part in (port.device, port.stable_name, port.description) if part)
-    if not found:
+    if not ports_there:
         yield "no serial port"
 
 
@@ -263,7 +263,7 @@ def _state() -> Iterator[str]:
     yield str(folder)
     try:
         files = sorted(path for path in folder.rglob("*") if path.is_file())
-        for path in files[:LONGEST]:
+        for path in files[:MOST_LISTED_LINES]:
             yield f"{path.stat().st_size:>10} {path.relative_to(folder)}"
     except OSError as problem:
         yield f"problem: {why(problem)}"
@@ -274,13 +274,13 @@ def features(as_json: bool) -> int:
     import json
 
     load_others()  # their warnings are in the list
-    found = list(registry.states(multidrop.__version__))
+    states = list(registry.states(multidrop.__version__))
     if as_json:
-        for entry, meaning, state in found:
+        for entry, meaning, state in states:
             facts = {"name": entry.name, "source": entry.source, "version": entry.version, "state": state}
             write(sys.stdout, json.dumps(facts | {"meaning": meaning}))
         return 0
-    rows = [(entry.name, f"{entry.source} {entry.version}".strip(), state, meaning) for entry, meaning, state in found]
+    rows = [(entry.name, f"{entry.source} {entry.version}".strip(), state, meaning) for entry, meaning, state in states]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = (f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))

@@ -167,7 +167,7 @@ def scan(
 ) -> int:
     from multidrop.commands import scan
 
-    return scan.run(scan.Search(url, baud, dialect, json, all), yes, save)
+    return scan.run(scan.PortSearch(url, baud, dialect, json, all), yes, save)
 
 
 def rescue(
@@ -183,7 +183,7 @@ def rescue(
 ) -> int:
     from multidrop.commands import scan
 
-    return scan.rescue(scan.Search(url, baud, dialect, json, all), plain, erase, yes)
+    return scan.rescue(scan.PortSearch(url, baud, dialect, json, all), plain, erase, yes)
 
 
 def sim(cell: Cell = None, *, allow: tuple[Allowed, ...] = (), json: JsonEndpoints = False, speed: Speed = 1.0) -> int:
@@ -216,7 +216,7 @@ def poll(
 ) -> int:
     from multidrop.shell.plots import poll
 
-    return poll.poll(url, poll.Polling(names, drive or "all", every, rows, json), reconnect=not no_reconnect)
+    return poll.poll(url, poll.PollOptions(names, drive or "all", every, rows, json), reconnect=not no_reconnect)
 
 
 # Logs

@@ -27,37 +27,37 @@ from multidrop.api.blocking import Session
 from multidrop.api.sessions import Notice
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.base.files import bytes_of
-from multidrop.shell.batch.report import Report
+from multidrop.shell.batch.report import BatchReport
 from multidrop.shell.channel import Front
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.operations.argument_types import Agreeing, Opening
 from multidrop.shell.prompt.keyboard import on_stop_key, terminal
-from multidrop.shell.scripts.model import Result, ScriptLine
+from multidrop.shell.scripts.model import LineResult, ScriptLine
 from multidrop.shell.signals import SIGNALS, early_ends
 from multidrop.shell.streams.stdout import fail, lost_reader, why_interrupted, work_done, write
 
 T = TypeVar("T")
 
 
-def result_of(end: BaseException, file: str, number: int) -> Result:
+def result_of(end: BaseException, file: str, number: int) -> LineResult:
     line = ScriptLine(file, number, linecache.getline(file, number).strip() or file)
     error = str(end) if isinstance(end, FAILURES) else f"{type(end).__name__}: {end}".removesuffix(": ")
     failed = isinstance(end, AssertionError)
-    return Result(line, line.text, datetime.now().astimezone(), 0.0, error=error, failed_check=failed)
+    return LineResult(line, line.text, datetime.now().astimezone(), 0.0, error=error, failed_check=failed)
 
 
 class ReportedSession(Session):
     """A session that reports what each call of a program sends and prints."""
 
-    def __init__(self, file: str, report: Report | None, *, yes: bool, beyond: bool, notice: Notice) -> None:
+    def __init__(self, file: str, report: BatchReport | None, *, yes: bool, beyond: bool, notice: Notice) -> None:
         self._file = file
         self._report = report
         self._out = sys.stdout
         self._stopped_by_person = False
         self._sent: list[Entered] = []
         self._printed: list[str] = []
-        self._failed: tuple[BaseException, Result] | None = None
+        self._failed: tuple[BaseException, LineResult] | None = None
         """The last call, if it failed, and its result: the program may end with it, or go on."""
         super().__init__(yes=yes, beyond=beyond, notice=notice)
         self._awaited._shell.front = Front()  # a person agrees by the options of the command
@@ -100,7 +100,7 @@ class ReportedSession(Session):
             self._tell(self._failed[1])
             self._failed = None
 
-    def ended(self, end: BaseException) -> Result | None:
+    def ended(self, end: BaseException) -> LineResult | None:
         """The result of the call with whose failure the program ended; None if it was none."""
         failed, self._failed = self._failed, None
         if failed is not None and failed[0] is end:
@@ -109,19 +109,19 @@ class ReportedSession(Session):
             self._tell(failed[1])
         return None
 
-    def _tell(self, result: Result) -> None:
+    def _tell(self, result: LineResult) -> None:
         if self._report is not None:
             with replaced("stdout", self._out):
                 self._report.executed(result, counts=False)
 
-    def _result(self, error: str, begun: datetime) -> Result:
-        first, text = self._sent[0], "; ".join(each.line for each in self._sent)
+    def _result(self, error: str, begun: datetime) -> LineResult:
+        first, text = self._sent[0], "; ".join(entered.line for entered in self._sent)
         seconds = (datetime.now().astimezone() - begun).total_seconds()
         frame: FrameType | None = sys._getframe()
         while frame is not None and frame.f_code.co_filename != self._file:
             frame = frame.f_back
         line = ScriptLine(self._file, frame.f_lineno if frame is not None else 0, text)
-        return Result(line, text, begun, seconds, tuple(self._printed), first.bus, first.address, error)
+        return LineResult(line, text, begun, seconds, tuple(self._printed), first.bus, first.address, error)
 
 
 def place(end: BaseException, file: str) -> int:
@@ -131,17 +131,17 @@ def place(end: BaseException, file: str) -> int:
 
 
 def traceback_of(end: BaseException) -> list[str]:
-    found = traceback.TracebackException.from_exception(end)
-    each: traceback.TracebackException | None = found
+    trace = traceback.TracebackException.from_exception(end)
+    cause: traceback.TracebackException | None = trace
     loaded = [module for name, module in sys.modules.items() if name.partition(".")[0] == multidrop.__name__]
     ours = {getattr(module, "__file__", None) or "" for module in loaded}
-    while each is not None:
-        frames: list[traceback.FrameSummary] = list(each.stack)
+    while cause is not None:
+        frames: list[traceback.FrameSummary] = list(cause.stack)
         inside = dropwhile(lambda frame: frame.filename in ours, frames)
         kept: list[traceback.FrameSummary] = list(takewhile(lambda frame: frame.filename not in ours, inside))
-        each.stack = traceback.StackSummary.from_list(kept)
-        each = each.__cause__ or each.__context__
-    return "".join(found.format()).rstrip().splitlines()
+        cause.stack = traceback.StackSummary.from_list(kept)
+        cause = cause.__cause__ or cause.__context__
+    return "".join(trace.format()).rstrip().splitlines()
 
 
 @contextlib.contextmanager
@@ -154,7 +154,7 @@ def replaced(name: str, stream: object) -> Iterator[None]:
         setattr(sys, name, before)
 
 
-def run(file: str, opening: Opening, as_json: bool, agreeing: Agreeing, report: Report) -> int:
+def run(file: str, opening: Opening, as_json: bool, agreeing: Agreeing, report: BatchReport) -> int:
     try:
         data = bytes_of(file)
         code = compile(data, file, "exec", dont_inherit=True)  # before anything is opened
@@ -175,7 +175,7 @@ class _Execution:
     """One program: its signals, its session, and how it ended."""
 
     def __init__(
-        self, file: str, opening: Opening, as_json: bool, agreeing: Agreeing, report: Report, code: CodeType
+        self, file: str, opening: Opening, as_json: bool, agreeing: Agreeing, report: BatchReport, code: CodeType
     ) -> None:
         self._opening, self._as_json, self._agreeing = opening, as_json, agreeing
         self._report = report
@@ -183,7 +183,7 @@ class _Execution:
         self._file = file
         self._stopped = self._interrupted = self._ending = False
         self._on_continue: list[Callable[[], None]] = []
-        self._called: Result | None = None
+        self._called: LineResult | None = None
         """The result of the call with whose failure the program ended."""
 
     def run(self) -> int:
@@ -232,8 +232,8 @@ class _Execution:
         raise KeyboardInterrupt
 
     def _continued(self, number: int, frame: object) -> None:
-        for each in self._on_continue:
-            each()
+        for callback in self._on_continue:
+            callback()
 
     # The session
 
@@ -280,7 +280,7 @@ class _Execution:
             if self._as_json:
                 around.enter_context(replaced("stdout", sys.stderr))
             script.session, script.values = session, dict(self._opening.set)
-            around.callback(lambda: [script.__dict__.pop(each) for each in ("session", "values")])
+            around.callback(lambda: [script.__dict__.pop(name) for name in ("session", "values")])
             exec(self._code, module.__dict__)
 
     def _ended(self, end: BaseException) -> int:

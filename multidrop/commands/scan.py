@@ -18,7 +18,7 @@ from multidrop.shell.session import Session
 
 
 @dataclass(frozen=True)
-class Search:
+class PortSearch:
     """What is searched for: `url` is a port of which nothing is known."""
 
     url: str
@@ -33,13 +33,13 @@ class Search:
         return [self.baud] if self.baud else []
 
 
-def run(search: Search, yes: bool, save: str) -> int:
+def run(search: PortSearch, yes: bool, save: str) -> int:
     if save:
         configuration.check_new(save)
     return runner.run([], partial(_scan, search, save), agreed=yes, unsolicited=False)
 
 
-async def _scan(search: Search, save: str, session: Session) -> None:
+async def _scan(search: PortSearch, save: str, session: Session) -> None:
     urls = parse(search.url, session.settings.connections).scheme.searched(search.url)
     searches = [_made(search, session, url) for url in urls]
     failed: TransportLost | None = None
@@ -50,13 +50,13 @@ async def _scan(search: Search, save: str, session: Session) -> None:
             failed = loss
             if len(searches) > 1:
                 session.notify(str(loss), warning=True)
-    found = [drive for scanning in searches for drive in scanning.found]
-    if failed is not None and not found:
+    drives = [drive for scanning in searches for drive in scanning.found]
+    if failed is not None and not drives:
         raise failed
-    _conclude(search.json, session, found, save)
+    _conclude(search.json, session, drives, save)
 
 
-def _made(search: Search, session: Session, url: str) -> Scanning:
+def _made(search: PortSearch, session: Session, url: str) -> Scanning:
     """Make the search that the arguments ask for; it prints each drive that it finds. Raises Diagnostic."""
     connection = parse(url, session.settings.connections)
     if search.dialect:
@@ -76,21 +76,21 @@ def _conclude(as_json: bool, session: Session, found: list[FoundDrive], name: st
         session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
     elif not as_json:
         session.notify(f"open with: multidrop shell {shlex.quote(url)}", outcome=True)
-    if (others := sum(each.form != found[0].form for each in found)) and not as_json:
+    if (others := sum(drive.form != found[0].form for drive in found)) and not as_json:
         session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
 
 
-def rescue(search: Search, plain: bool, erase: bool, yes: bool) -> int:
+def rescue(search: PortSearch, plain: bool, erase: bool, yes: bool) -> int:
     return runner.run([], partial(_rescue, search, plain, erase), agreed=yes, unsolicited=False)
 
 
-async def _rescue(search: Search, plain: bool, erase: bool, session: Session) -> None:
+async def _rescue(search: PortSearch, plain: bool, erase: bool, session: Session) -> None:
     scanning = _made(search, session, search.url)
     rescue = Rescue(session, scanning)
     await rescue.run(search.bauds, everything=search.all, erase=erase)
     if plain:
         if len(scanning.found) > 1:
-            names = ", ".join(each.state.address for each in scanning.found)
+            names = ", ".join(drive.state.address for drive in scanning.found)
             raise Diagnostic(f"--plain is for a drive that is alone; {names} replied", search.url, "nothing was set")
         await rescue.make_plain(scanning.found[0])
     _conclude(search.json, session, scanning.found)

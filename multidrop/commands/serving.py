@@ -58,7 +58,7 @@ def relay(port: str, baud: int) -> int:
         from multidrop.shell.relaying import lender
 
         lent = lender(port)
-        write(sys.stderr, *(f"warning: {each}" for each in registry.warnings()))
+        write(sys.stderr, *(f"warning: {warning}" for warning in registry.warnings()))
         if lent is not None:
             lent.lend(port.partition(":")[2])
             return 0
@@ -85,8 +85,8 @@ def relay(port: str, baud: int) -> int:
 def ports(as_json: bool) -> int:
     from multidrop.shell.connect.schemes import local_ports
 
-    found = [*local_ports()]
-    for port in found:
+    ports_there = [*local_ports()]
+    for port in ports_there:
         if as_json:
             import json
 
@@ -94,7 +94,7 @@ def ports(as_json: bool) -> int:
             write(sys.stdout, json.dumps(fact))
         else:
             write(sys.stdout, "  ".join(part for part in (port.device, port.stable_name, port.description) if part))
-    if not found and not as_json:
+    if not ports_there and not as_json:
         write(sys.stderr, "no serial port was found; multidrop demo needs none")
     return 0
 

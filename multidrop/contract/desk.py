@@ -272,7 +272,7 @@ class Opened:
         self.events.clear()
         for line in lines:
             await self.run(line)
-        return [each.text for each in self.events if isinstance(each, Printed | Output)]
+        return [event.text for event in self.events if isinstance(event, Printed | Output)]
 
     async def refusal(self, *lines: str) -> str:
         """Run lines of which the last one must fail; return its one line."""
@@ -287,7 +287,7 @@ class Opened:
 
     def told(self) -> list[str]:
         """What was narrated or failed."""
-        return [each.text for each in self.events if isinstance(each, Notified | Failed)]
+        return [event.text for event in self.events if isinstance(event, Notified | Failed)]
 
     async def motions(self, address: str) -> tuple[Motion, ...]:
         """Position and velocity of each axis of a drive, as it reports them."""

@@ -140,7 +140,7 @@ class Lines(OfFamily):
             self.without("a line to all drives")
         async with desk.session() as opened:
             assert await opened.say(f"@* {written.line}") == []
-            read = [await opened.say(f"@{each} {written.read}") for each in self.sample.addresses]
+            read = [await opened.say(f"@{address} {written.read}") for address in self.sample.addresses]
             assert read == [[written.after]] * len(self.sample.addresses)
 
     @in_virtual_time

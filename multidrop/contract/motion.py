@@ -25,7 +25,7 @@ class Motions(OfFamily):
 
     async def places(self, opened: Opened) -> list[tuple[int, int]]:
         """Position and velocity of the first axis of each drive."""
-        found = [await opened.motions(each) for each in self.sample.addresses]
+        found = [await opened.motions(address) for address in self.sample.addresses]
         return [(axes[0].position, axes[0].velocity) for axes in found]
 
     async def far(self, opened: Opened) -> None:
@@ -140,15 +140,15 @@ class Motions(OfFamily):
             looking = opened.bus.telemetry.subscribe([*desk.names], 0.1)
             await asyncio.sleep(2.0)
             looking.close()
-            found = [each.event for each in opened.events if isinstance(each, OnBus)]
+            found = [event.event for event in opened.events if isinstance(event, OnBus)]
             samples = [each for each in found if isinstance(each, Sample)]
             axes = [each.axis for each in await opened.motions(desk.names[0])]
-            own = [each for each in samples if (each.address, each.axis) == (desk.names[0], axes[0])]
+            own = [sample for sample in samples if (sample.address, sample.axis) == (desk.names[0], axes[0])]
             assert len(own) > 5 and own[-1].velocity != 0
             assert len({each.position for each in own}) == len(own)
-            seen = {(each.address, each.axis) for each in samples}
+            seen = {(sample.address, sample.axis) for sample in samples}
             assert seen == {(name, axis) for name in desk.names for axis in axes}
-            assert {each.position for each in samples if each not in own} <= {0}
+            assert {sample.position for sample in samples if sample not in own} <= {0}
 
     @in_virtual_time
     async def test_it_is_known_which_lines_can_start_something(self, desk: Desk) -> None:
@@ -157,8 +157,8 @@ class Motions(OfFamily):
             starts = {line for line in (*self.sample.starts, *self.sample.harmless) if opened.drive.starts(line)}
             assert starts == {*self.sample.starts}
             lines = (*self.sample.starts, *self.sample.harmless)
-            assert {each for each in lines if family.only_reads(each)} == {*self.sample.only_reads}
-            assert {each for each in lines if family.only_ends(each)} == {*self.sample.ended_only}
+            assert {line for line in lines if family.only_reads(line)} == {*self.sample.only_reads}
+            assert {line for line in lines if family.only_ends(line)} == {*self.sample.ended_only}
             motions = opened.drive.family.motions
             for axis in ("", "x", "0"):
                 assert motions.place(NO_SIGNS, axis) is None and not motions.runs(NO_SIGNS)
@@ -206,8 +206,8 @@ class Stopping(Motions):
             for part in self.sample.stop_all:
                 assert part in opened.written
             stood = [await opened.motions(name) for name in desk.names]
-            assert not any(each.velocity for axes in stood for each in axes)
-            assert all(sum(each.position != 0 for each in axes) == 1 + len(self.sample.far_others) for axes in stood)
+            assert not any(axis.velocity for axes in stood for axis in axes)
+            assert all(sum(axis.position != 0 for axis in axes) == 1 + len(self.sample.far_others) for axes in stood)
             await asyncio.sleep(5.0)
             assert [await opened.motions(name) for name in desk.names] == stood
 

@@ -122,11 +122,11 @@ class Settings(Motions):
                 found = await opened.drive.run(values.first(values.check(word.line)))
                 assert found == float(word.printed)
                 assert parse_series(opened.session, [word.line]) == (Series(LINE, desk.names[0], word.line),)
-                reading = opened.bus.telemetry.read([telemetry.Value(desk.names[0], word.line)], 0.1)
+                reading = opened.bus.telemetry.read([telemetry.DriveValue(desk.names[0], word.line)], 0.1)
                 await asyncio.sleep(2.0)
                 reading.close()
-                events = [each.event for each in opened.events if isinstance(each, OnBus)]
-                read = [each.value for each in events if isinstance(each, Valued)]
+                events = [event.event for event in opened.events if isinstance(event, OnBus)]
+                read = [event.value for event in events if isinstance(event, Valued)]
                 assert len(read) > 10 and {*read} == {float(word.printed)}
             with pytest.raises(Exception, match="QQQQQQ") as failure:
                 await opened.drive.run(values.first(values.check("QQQQQQ")))

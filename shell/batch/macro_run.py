@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from multidrop.base.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, missing
 from multidrop.shell.batch import runner
-from multidrop.shell.batch.report import Report
+from multidrop.shell.batch.report import BatchReport
 from multidrop.shell.configuration import Settings
 from multidrop.shell.exit_codes import INTERRUPTED
 from multidrop.shell.operations.argument_types import Agreeing, Opening, Reporting
@@ -22,7 +22,7 @@ def play(name: str, opening: Opening, times: int | None, fast: bool, reporting: 
     """Play a macro; report wrong values and lines before anything is opened. What was checked is what plays."""
     if not (opening.on or opening.role):
         raise Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL")
-    report = Report(f"macro {name}", as_json=reporting.json, junit=reporting.junit)
+    report = BatchReport(f"macro {name}", as_json=reporting.json, junit=reporting.junit)
     try:
         report.begin()
         settings, values = Settings(), dict(opening.set)

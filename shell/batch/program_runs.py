@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import counted
 from multidrop.dialects.program_files import errors
-from multidrop.shell.operations.argument_types import Checking, Testing
-from multidrop.shell.programs.checking import USUAL, Checked, examine, rewrite, to_run
+from multidrop.shell.operations.argument_types import CheckOptions, Testing
+from multidrop.shell.programs.checking import USUAL_PERSONALITY, Checked, examine, rewrite, to_run
 from multidrop.shell.streams.stdout import fail, reader_left, shortened, write
 
 if TYPE_CHECKING:
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
 
 WRONG = FAILED = 1
 """The exit codes of files with errors, and of a test that failed."""
-MOST = 100
+MOST_SHOWN_PROBLEMS = 100
 """The largest number of problems of a file that are shown."""
 
 
-def check(files: Sequence[str], how: Checking) -> int:
+def check(files: Sequence[str], how: CheckOptions) -> int:
     """Check the files in turn; return the highest exit code."""
     reported = dict[str, tuple[str, str]]()
-    personality = how.personality or USUAL
+    personality = how.personality or USUAL_PERSONALITY
     if how.cell is not None:
         spec = drive(how.cell, None)
         personality, reported = spec.personality, {spec.personality: (spec.identity.version, spec.identity.part)}
     return max(_check_file(file, personality, how, reported) for file in files)
 
 
-def _check_file(file: str, personality: str, how: Checking, reported: Mapping[str, tuple[str, str]]) -> int:
+def _check_file(file: str, personality: str, how: CheckOptions, reported: Mapping[str, tuple[str, str]]) -> int:
     try:
         checked = examine(file, personality, how.language, reported)
         _report(checked, how.json)
@@ -55,15 +55,21 @@ def _check_file(file: str, personality: str, how: Checking, reported: Mapping[st
 
 
 def _report(checked: Checked, json: bool) -> None:
-    """Write each problem; for a person MOST of them."""
-    for each in checked.problems if json else checked.problems[:MOST]:
+    """Write each problem; for a person MOST_SHOWN_PROBLEMS of them."""
+    for problem in checked.problems if json else checked.problems[:MOST_SHOWN_PROBLEMS]:
         if json:
-            kind = "warning" if each.warning else "error"
-            fact = {"file": checked.file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
+            kind = "warning" if problem.warning else "error"
+            fact = {
+                "file": checked.file,
+                "line": problem.line,
+                "column": problem.column,
+                kind: problem.what,
+                "hint": problem.hint,
+            }
             _write_fact({key: value for key, value in fact.items() if value != ""})
         else:
-            write(sys.stderr, shortened(each.line_for(checked.file)))
-    if not json and (more := len(checked.problems) - MOST) > 0:
+            write(sys.stderr, shortened(problem.line_for(checked.file)))
+    if not json and (more := len(checked.problems) - MOST_SHOWN_PROBLEMS) > 0:
         write(sys.stderr, f"{checked.file}: {counted(more, 'more problem')}, not shown")
 
 
@@ -96,11 +102,11 @@ def drive(cell: str | None, personality: str | None) -> DriveSpec:
 
 def _test(file: str, how: Testing, given: DriveSpec | None, several: bool) -> int:
     from multidrop.simulator.families import PROGRAMS
-    from multidrop.simulator.program_events import Debugging
+    from multidrop.simulator.program_events import DebugWishes
 
     began = time.perf_counter()
     head = {"file": file} if several else {}
-    debugging = Debugging(how.trace, how.breaks, how.watch)
+    debugging = DebugWishes(how.trace, how.breaks, how.watch)
     failed = False
     try:
         text, language = to_run(file, how.language)

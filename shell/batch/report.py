@@ -25,7 +25,7 @@ from multidrop.shell.streams.stdout import fail, write
 from multidrop.shell.streams.stdout import report as described
 
 if TYPE_CHECKING:
-    from multidrop.shell.scripts.model import Ending, Result
+    from multidrop.shell.scripts.model import LineResult, MacroEnding
     from multidrop.shell.session import Session
 
 
@@ -43,7 +43,7 @@ class Case:
     printed: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, result: Result) -> Case:
+    def of(cls, result: LineResult) -> Case:
         failure, error = (result.error, "") if result.failed_check else ("", result.error)
         name = f"{result.where}: {result.reported}"
         suite = f"macro {result.line.macro}" if result.line.macro else result.line.file
@@ -68,14 +68,14 @@ def junit(name: str, cases: Sequence[Case], begun: datetime, seconds: float) -> 
             timestamp=begun.isoformat(timespec="seconds"),
         )
         for case in own:
-            found = ElementTree.SubElement(
+            case_element = ElementTree.SubElement(
                 suite, "testcase", name=_shown(case.name), classname=_shown(case.file), time=f"{case.seconds:.3f}"
             )
             for kind in ("failure", "error"):
                 if text := _shown(getattr(case, kind)):
-                    ElementTree.SubElement(found, kind, message=text).text = text
+                    ElementTree.SubElement(case_element, kind, message=text).text = text
             if case.printed:
-                ElementTree.SubElement(found, "system-out").text = "\n".join(map(_shown, case.printed))
+                ElementTree.SubElement(case_element, "system-out").text = "\n".join(map(_shown, case.printed))
     ElementTree.indent(root)
     whole: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return whole + b"\n"
@@ -135,7 +135,7 @@ def check_place(path: str, option: str, sign: bytes, what: str) -> None:
         raise Diagnostic(f"exists already and is not a {what}", path, "name a new file for the report")
 
 
-class Report:
+class BatchReport:
     """The reports of one run. `executed` takes each result; `finish` writes what is left at the end."""
 
     def __init__(self, name: str, *, as_json: bool = False, junit: str = "") -> None:
@@ -146,13 +146,13 @@ class Report:
         self._cases: list[Case] = []
         self._lines = self._checks = self._failed = self._failed_checks = 0
         self._failure = ""
-        self._ending: Ending | None = None
+        self._ending: MacroEnding | None = None
 
     def begin(self) -> None:
         """See `JUnitFile.begin`. Raises Diagnostic."""
         self._junit.begin()
 
-    def executed(self, result: Result, *, counts: bool = True) -> None:
+    def executed(self, result: LineResult, *, counts: bool = True) -> None:
         """Take the result of a line. `counts`: its failure is one of the script."""
         self._lines += 1
         self._checks += result.check
@@ -163,13 +163,13 @@ class Report:
         if counts and self._junit.wanted and (result.check or not result.ok):
             self._cases.append(Case.of(result))
 
-    def ended(self, ending: Ending) -> None:
+    def ended(self, ending: MacroEnding) -> None:
         self._ending = ending
 
     def refused(self, failure: Diagnostic) -> int:
         """Report a script that is not executed, with each of its errors; return the exit code."""
-        for each in getattr(failure, "problems", (failure,)):
-            self._cases.append(Case(each.where or self._name, self._name, error=str(each)))
+        for problem in getattr(failure, "problems", (failure,)):
+            self._cases.append(Case(problem.where or self._name, self._name, error=str(problem)))
         self.finish(2)
         return fail(failure)
 

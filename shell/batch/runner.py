@@ -24,7 +24,7 @@ from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
 from multidrop.shell.prompt.terminal_input import asker
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
-from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.event_printer import EventPrinter
 from multidrop.shell.streams.stdout import fail, finish, nonblocking, report, why_interrupted, work_done
 from multidrop.shell.workspace import Workspace
 
@@ -59,13 +59,13 @@ def run(
     A failure is one line on standard error.
     """
     try:
-        found = configuration.load()
+        settings = configuration.load()
     except FAILURES as failure:
         return fail(failure)
     try:
-        create = partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried)
+        create = partial(Session, settings, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried)
         make = partial(_session, create, agreed, beyond)
-        printer = Printer(unsolicited=unsolicited, replies=replies)
+        printer = EventPrinter(unsolicited=unsolicited, replies=replies)
         with early_ends(), asyncio.Runner(loop_factory=loop) as runner:  # before the log has its thread
             return runner.run(_run(make, printer, urls, body, watch_keys, interrupted, asks))
     except KeyboardInterrupt:
@@ -80,7 +80,7 @@ def _session(make: Callable[[], Session], agreed: bool, beyond: bool) -> Session
 
 async def _run(
     make: Callable[[], Session],
-    printer: Printer,
+    printer: EventPrinter,
     urls: Sequence[str],
     body: Body,
     watch_keys: bool,
@@ -111,7 +111,7 @@ async def _run(
             return code
 
 
-async def _tick(session: Session, printer: Printer) -> None:
+async def _tick(session: Session, printer: EventPrinter) -> None:
     """Name what is under way in each second in which nothing was printed."""
     while True:
         await asyncio.sleep(SILENCE / 2)
@@ -119,7 +119,7 @@ async def _tick(session: Session, printer: Printer) -> None:
 
 
 class _Host:
-    def __init__(self, session: Session, printer: Printer, code: int) -> None:
+    def __init__(self, session: Session, printer: EventPrinter, code: int) -> None:
         self._session = session
         self._printer = printer
         self._code = code
@@ -152,9 +152,9 @@ class _Host:
             code, lines = self._code, said if self._code else []  # a plot ends well
         elif self._session.latched and (tally := self._session.tally()).found:  # a search has closed its port by now
             lines.insert(0, f"stop: {stop_report.words(tally)}")
-        for each in lines:
-            if each:
-                self._printer.notify(each)
+        for line in lines:
+            if line:
+                self._printer.notify(line)
         return code
 
     async def _whole(self, urls: Sequence[str], body: Body) -> int | None:

@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Sample
-from multidrop.shell.comparing.differences import Comparison, Pair, Verdict, causes
+from multidrop.shell.comparing.differences import AxisComparison, Pair, Verdict, causes
 from multidrop.shell.events import Agreed, Diverged, Predicted, TwinEvent
 
 SWITCHES = {"lim+": "limit+", "lim-": "limit-"}
@@ -35,7 +35,7 @@ class Compared(Generic[T]):
         self.twin = twin
         self.doubtful = ""
         """The last line of which it is not known whether the drive executed it."""
-        self.axes: dict[str, Comparison] = {}
+        self.axes: dict[str, AxisComparison] = {}
         self.differences: dict[str, int] = {}
         """The last difference of each axis."""
         self._causes: dict[str, tuple[str, ...]] = {}
@@ -50,10 +50,10 @@ class Compared(Generic[T]):
     @property
     def causes(self) -> tuple[str, ...]:
         """The candidates for the differences that are above the limit now, of all axes."""
-        return tuple(dict.fromkeys(each for named in self._causes.values() for each in named))
+        return tuple(dict.fromkeys(cause for named in self._causes.values() for cause in named))
 
-    def comparison(self, axis: str) -> Comparison:
-        return self.axes.setdefault(axis, Comparison())
+    def comparison(self, axis: str) -> AxisComparison:
+        return self.axes.setdefault(axis, AxisComparison())
 
     def disturbed(self, at: float, late: float = 0.0) -> None:
         """Note a command or an input at this time, or up to `late` s later.
@@ -65,9 +65,9 @@ class Compared(Generic[T]):
 
     def conditions(self, found: tuple[Conditions, ...]) -> None:
         """Take the lamps of the drive, which others read."""
-        for each in found:
-            lit = [SWITCHES[lamp.function] for lamp in each.lamps if lamp.on and lamp.function in SWITCHES]
-            self._limits[each.axis] = tuple(lit)
+        for conditions in found:
+            lit = [SWITCHES[lamp.function] for lamp in conditions.lamps if lamp.on and lamp.function in SWITCHES]
+            self._limits[conditions.axis] = tuple(lit)
 
     def sample(self, sample: Sample, rest: int) -> Iterator[TwinEvent]:
         """Compare a sample with the twin. `rest`: the limit at rest, steps."""
@@ -87,7 +87,9 @@ class Compared(Generic[T]):
                 self.twin.align(sample.axis, sample.position, sample.at)
             axis.calm()
 
-    def news(self, verdict: Verdict, comparison: Comparison, address: str, axis: str, rest: int) -> Diverged | Agreed:
+    def news(
+        self, verdict: Verdict, comparison: AxisComparison, address: str, axis: str, rest: int
+    ) -> Diverged | Agreed:
         """Make the event of a verdict; an agreement shows that no line was lost."""
         pairs = list(comparison.pairs)
         if verdict is Verdict.AGREED:

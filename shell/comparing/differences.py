@@ -6,7 +6,7 @@ command or an input in the middle of a move adds as much once more, until both a
 end depends on the moment then. A reply that came late, or a gap between two readings, adds its time until both are at
 rest or were seen to agree without it (`lag`): what was delayed may have been the command. A difference beyond the limit
 counts once it has lasted for `LASTING`, and is over in the same way. Where the drive stands and its twin has moved on,
-it lasts for `HELD`: meanwhile the lamps of the drive are read.
+it lasts for `DOUBT_TIME`: meanwhile the lamps of the drive are read.
 
 What a twin cannot follow (`lost`), it leaves uncompared until the drive has been at rest for `SETTLED`, or both have
 agreed for as long; then it takes the position.
@@ -78,27 +78,27 @@ def causes(pairs: Sequence[Pair], doubtful: str = "", limits: Sequence[str] = ()
     `doubtful`: the last line of which it is not known whether it was executed. `limits`: the active limits, by the
     function of their lamps.
     """
-    found = list(dict.fromkeys(_likely(pairs, limits)))
+    likely = list(dict.fromkeys(_likely(pairs, limits)))
     if doubtful:
-        found.insert(0, f"it is not known whether '{doubtful}' was executed")
-    return tuple(found)
+        likely.insert(0, f"it is not known whether '{doubtful}' was executed")
+    return tuple(likely)
 
 
 def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
     if unmoved(pairs):  # a drive that reports velocity 0 was pushed
-        yield from (UNSEEN, SETTINGS) if any(each.velocity for each in pairs) else (SLIP, PUSHED, UNSEEN)
-    elif _left_behind([(each.position, each.predicted) for each in pairs]):
+        yield from (UNSEEN, SETTINGS) if any(pair.velocity for pair in pairs) else (SLIP, PUSHED, UNSEEN)
+    elif _left_behind([(pair.position, pair.predicted) for pair in pairs]):
         # The causes of a drive at rest: where it never began to move, its load comes before a stall.
         if limits:
             yield f"{AT_LIMIT} ({', '.join(limits)})"
-        never = len({each.position for each in pairs}) == 1
+        never = len({pair.position for pair in pairs}) == 1
         yield from (LOAD, STALL) if never else (STALL, LOAD)
         yield AT_LIMIT if not limits else SETTINGS
     elif _fell_short(pairs):
         yield from (STALL, LOAD, SLIP, AT_LIMIT, SETTINGS)
     elif _slipped(pairs):
         yield from (SLIP, LOAD, UNSEEN)
-    elif _left_behind([(each.predicted, each.position) for each in pairs]):
+    elif _left_behind([(pair.predicted, pair.position) for pair in pairs]):
         yield from (UNSEEN, SETTINGS)
     elif _lost_speed(pairs):
         yield from (LOAD, SETTINGS, STALL)
@@ -108,17 +108,17 @@ def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
 
 def unmoved(pairs: Sequence[Pair]) -> bool:
     """Whether the twin was at rest all the time."""
-    return not any(each.expected for each in pairs) and len({each.predicted for each in pairs}) <= 1
+    return not any(pair.expected for pair in pairs) and len({pair.predicted for pair in pairs}) <= 1
 
 
 def _left_behind(places: Sequence[tuple[int, int]]) -> bool:
     """Whether the first of two is at rest at the end, and most of the difference came since: the other one moved on."""
     stands, there = places[-1]
     first = places[-1]
-    for each in reversed(places):
-        if each[0] != stands:
+    for place in reversed(places):
+        if place[0] != stands:
             break
-        first = each
+        first = place
     apart = abs(there - stands)
     return apart > abs(first[1] - stands) and 2 * abs(there - first[1]) >= apart
 
@@ -136,7 +136,7 @@ def _fell_short(pairs: Sequence[Pair]) -> bool:
 def _slipped(pairs: Sequence[Pair]) -> bool:
     """Whether the difference has jumped: no velocity between two readings explains it."""
     for before, after in pairwise(pairs):
-        apart = max(abs(each.velocity - each.expected) for each in (before, after))
+        apart = max(abs(pair.velocity - pair.expected) for pair in (before, after))
         explained = apart * (after.at - before.at) + max(before.fastest, after.fastest) * SKEW
         if abs(after.difference - before.difference) > explained + JITTER:
             return True
@@ -145,25 +145,25 @@ def _slipped(pairs: Sequence[Pair]) -> bool:
 
 def _lost_speed(pairs: Sequence[Pair]) -> bool:
     """Whether the drive became slower after it had been as fast as its twin, which went on at a constant velocity."""
-    top = max(abs(each.expected) for each in pairs)
-    steady = [each for each in pairs if abs(each.expected) >= (1 - EQUAL) * top]
-    slower = [each.equally_fast for each in steady]
+    top = max(abs(pair.expected) for pair in pairs)
+    steady = [pair for pair in pairs if abs(pair.expected) >= (1 - EQUAL) * top]
+    slower = [pair.equally_fast for pair in steady]
     return any(slower) and not slower[-1] and abs(steady[-1].velocity) < abs(steady[-1].expected)
 
 
-LIMIT = 50
+DIFFERENCE_LIMIT = 50
 """Default limit at rest, steps."""
 LASTING = 0.1
 """Seconds after which a difference, or an agreement, counts."""
-HELD = 0.7
+DOUBT_TIME = 0.7
 """Seconds after which the difference of a drive counts that stands while its twin has moved on."""
 SETTLED = 1.0
 """Seconds of rest, or of agreement, after which a twin takes a position that it could not follow."""
-GAP = 3
+GAP_TIMES = 3
 """A time between two readings is a gap if it is more than so many times the usual one."""
 FADING = 0.95
 """The part of a delay that is still expected after a further reading without it."""
-KEPT = 400
+MOST_KEPT_PAIRS = 400
 """Pairs that are kept to find a cause."""
 
 
@@ -175,7 +175,7 @@ class Verdict(Enum):
 
 
 @dataclass
-class Comparison:
+class AxisComparison:
     """The comparison of one axis."""
 
     apart: bool = False
@@ -186,7 +186,7 @@ class Comparison:
     """Seconds by which an input that started the present move was seen late, at most."""
     took: float = 0.0
     """Seconds that the last reading took: its parts are of different times."""
-    pairs: deque[Pair] = field(default_factory=lambda: deque(maxlen=KEPT))
+    pairs: deque[Pair] = field(default_factory=lambda: deque(maxlen=MOST_KEPT_PAIRS))
     """From the last two that agreed well to the present one."""
     doubted: Pair | None = None
     """The first pair that contradicts the state."""
@@ -211,7 +211,9 @@ class Comparison:
         return round(self._limit(pair, rest, self.lag))
 
     def _limit(self, pair: Pair, rest: int, lag: float) -> float:
-        fastest = max([each.fastest for each in [*self.pairs][-1:]], default=0)  # a reading may begin while it moves
+        fastest = max(
+            [last_pair.fastest for last_pair in [*self.pairs][-1:]], default=0
+        )  # a reading may begin while it moves
         return rest + self.slack + max(pair.fastest, fastest) * (SKEW + self.took + lag)
 
     def take(self, pair: Pair, rest: int) -> Verdict | None:
@@ -233,14 +235,14 @@ class Comparison:
             self.doubted = None
             return None
         self.doubted = self.doubted or pair
-        return self.settle() if pair.at - self.doubted.at >= (HELD if self.held else LASTING) else None
+        return self.settle() if pair.at - self.doubted.at >= (DOUBT_TIME if self.held else LASTING) else None
 
     def _time(self, pair: Pair, rest: int) -> None:
         """Take the time since the reading before into the limit."""
         if not self.pairs:
             return
         interval = pair.at - self.pairs[-1].at
-        if self._usual and interval > GAP * self._usual:
+        if self._usual and interval > GAP_TIMES * self._usual:
             self.lag = max(self.lag, interval - self._usual)
         else:
             self._usual = FADING * self._usual + (1 - FADING) * interval if self._usual else interval
@@ -284,12 +286,12 @@ class Comparison:
         last = list(self.pairs)[-2:]
         if len(last) < 2 or self.doubted is not None or self.apart:
             return False
-        return all(each.velocity and each.equally_fast for each in last) and last[0].predicted != last[1].predicted
+        return all(pair.velocity and pair.equally_fast for pair in last) and last[0].predicted != last[1].predicted
 
     def rests(self, rest: int) -> bool:
         """Whether both are at rest and agree, so that the uncertainty of the last move is over."""
         last = list(self.pairs)[-2:]
-        settled = self._undisturbed > 1 and len(last) == 2 and all(each.at_rest for each in last)
+        settled = self._undisturbed > 1 and len(last) == 2 and all(pair.at_rest for pair in last)
         settled = settled and last[0].difference == last[1].difference
         return settled and not self.apart and abs(last[1].difference) <= self.limit(last[1], rest)
 

@@ -34,7 +34,7 @@ Naming = Callable[[str], str]
 
 
 @dataclass(frozen=True)
-class Opened:
+class OpenedBus:
     """A bus that does not read yet, the hints on its drives, and its simulated cell if it has one."""
 
     bus: Bus
@@ -52,12 +52,12 @@ class Opened:
     """The scales that a simulated cell states for its drives, by address, or `ADDRESS.AXIS`."""
 
 
-Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
+Opener = Callable[[Connection, Naming], Awaitable[list[OpenedBus]]]
 
 
 async def open_buses(
     connection: Connection, naming: Naming, state: Path | None = None, failure: TransportLost | None = None
-) -> list[Opened]:
+) -> list[OpenedBus]:
     """Open a connection. Raises Unreachable where nothing listens, Diagnostic for an unknown family.
 
     `state`: the folder that keeps what an interrupted session leaves on a port; None: nothing is kept. `failure`: the
@@ -75,7 +75,7 @@ async def open_buses(
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
         return [
-            Opened(
+            OpenedBus(
                 _bus(name, transport, connection, hints.family),
                 hints,
                 limits=limits,
@@ -89,10 +89,10 @@ async def open_buses(
     bus.link.leftovers.recovering = bool(kept.owed) and not family.codec.framed
     cut = "" if family.codec.framed else kept.cut  # a part of a frame is dropped after a pause
     warnings = (*kept.remarks, *([CUT.format(cut)] if cut else []))
-    found = replace(
+    known_hints = replace(
         hints, cut=cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=time.time_ns() // 10_000_000 % MARKS
     )
-    return [Opened(bus, found, warnings=warnings, limits=limits, reopen=reopen, absent=failure is not None)]
+    return [OpenedBus(bus, known_hints, warnings=warnings, limits=limits, reopen=reopen, absent=failure is not None)]
 
 
 MARKS = 90
@@ -113,19 +113,19 @@ class OpenedPort:
     """The family that its URL names; empty: it names none."""
     baud: int
     reopen: Reopen | None = None
-    """As for `Opened`."""
+    """As for `OpenedBus`."""
 
 
 async def open_port(connection: Connection) -> OpenedPort:
     """Open the byte pipe of a connection. Raises Unreachable, Diagnostic for a URL of several pipes or of none."""
     family, baud = connection.hints.family, connection.baud or _family(connection).baud
     if connection.scheme.simulated:
-        found = await _cell(connection)
-        first, *others = found
+        cell = await _cell(connection)
+        first, *others = cell
         if others:
-            for each in found:
-                await each.transport.close()
-            raise Diagnostic(f"{len(found)} buses", connection.text, f"name one of them, as in sim:#{first.name}")
+            for bus in cell:
+                await bus.transport.close()
+            raise Diagnostic(f"{len(cell)} buses", connection.text, f"name one of them, as in sim:#{first.name}")
         return OpenedPort(first.name, first.transport, family or first.dialect, first.baud or baud, simulated(first))
     transport, reopen = await _connected(connection)
     return OpenedPort(connection.short, transport, family, baud, reopen)
@@ -198,17 +198,17 @@ async def _cell(connection: Connection) -> Sequence[SimBus]:
     return await connect(target, configuration.load().allowed if connection.target else ())
 
 
-async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
-    found = []
-    for each in await _cell(connection):
+async def _simulated(connection: Connection, naming: Naming) -> list[OpenedBus]:
+    buses = []
+    for sim in await _cell(connection):
         given = connection.hints
         hints = replace(
             given,
-            family=given.family or each.dialect,
-            drives=given.drives or (each.names if each.party else ()),
-            party=each.party if given.party is None else given.party,
+            family=given.family or sim.dialect,
+            drives=given.drives or (sim.names if sim.party else ()),
+            party=sim.party if given.party is None else given.party,
         )
-        own = connection.name if connection.bus and connection.name else each.name
-        bus = _bus(naming(own), each.transport, connection, hints.family)
-        found.append(Opened(bus, hints, each.floor, reopen=simulated(each), units=each.units))
-    return found
+        own = connection.name if connection.bus and connection.name else sim.name
+        bus = _bus(naming(own), sim.transport, connection, hints.family)
+        buses.append(OpenedBus(bus, hints, sim.floor, reopen=simulated(sim), units=sim.units))
+    return buses

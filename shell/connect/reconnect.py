@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 
 Reopen = Callable[[Transport], Awaitable[Transport]]
 """Opens the port again in place of a broken transport, which it closes. Raises Unreachable, or Absent."""
-SLOWEST = 5.0
+LONGEST_OPENING = 5.0
 """The longest attempt to connect, s."""
-SHORTEST = 0.9
+SHORTEST_OPENING = 0.9
 """The shortest attempt to connect, s: each attempt asks once, so a host that is back is asked within that time."""
-PATIENCE = 4.0
+TIMES_AS_LONG = 4.0
 """An attempt to connect may take this many times as long as the first one took."""
 LOGIN = 4.0
 """The shortest attempt to log in, s: after a connection that others shared, a new one takes longer."""
@@ -94,7 +94,7 @@ def host_again(open_: Callable[[float], Awaitable[Transport]], took: float) -> R
 
     async def again(old: Transport) -> Transport:
         await old.close()
-        opened = await open_(min(max(SHORTEST, PATIENCE * took), SLOWEST))
+        opened = await open_(min(max(SHORTEST_OPENING, TIMES_AS_LONG * took), LONGEST_OPENING))
         if opened.identity != old.identity:
             await opened.close()
             another = f"another controller, {opened.identity}," if opened.identity else "a controller without a number"
@@ -112,7 +112,7 @@ class LoginAgain:
 
     def __init__(self, open_: Callable[[float, int | None], Awaitable[Transport]], took: float) -> None:
         self._open = open_
-        self._within = min(max(LOGIN, PATIENCE * took), SLOWEST_LOGIN)
+        self._within = min(max(LOGIN, TIMES_AS_LONG * took), SLOWEST_LOGIN)
         self._pauses = Pauses(0.0, LONGEST_PAUSE, FIRST_PAUSE)
 
     async def __call__(self, old: Transport) -> Transport:
@@ -146,9 +146,9 @@ def simulated(bus: SimBus) -> Reopen:
     return again
 
 
-FIRST = 0.1
+FIRST_RETRY_PAUSE = 0.1
 """The pause before the first attempt, s; each further one is twice as long."""
-LONGEST = 0.7
+LONGEST_RETRY_PAUSE = 0.7
 """The longest pause, s: a port that is back is noticed within a second, however long it was away."""
 GLANCE = 0.2
 """The pause while the port is known to be absent, s: to look costs nothing."""
@@ -159,10 +159,10 @@ Say = Callable[[str, str], None]
 
 def limit_of(failure: TransportLost) -> float:
     """The longest pause after an attempt that failed, s."""
-    return GLANCE if isinstance(failure, Absent) else LONGEST
+    return GLANCE if isinstance(failure, Absent) else LONGEST_RETRY_PAUSE
 
 
-SILENT = 5.0
+SILENT_PAUSE = 5.0
 """The pause before a line is asked again on which no drive has replied yet, s."""
 
 
@@ -175,7 +175,7 @@ class Newcomer(NamedTuple):
     """Called where none replies; whether they are asked again by themselves."""
 
 
-class Way(NamedTuple):
+class ReconnectWay(NamedTuple):
     """How a lost bus comes back."""
 
     hints: Hints
@@ -190,7 +190,7 @@ class Reconnections:
     def __init__(self, say: Say, wanted: bool) -> None:
         self._say = say
         self.wanted = wanted
-        self._ways: dict[str, Way] = {}
+        self._ways: dict[str, ReconnectWay] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     @property
@@ -200,7 +200,7 @@ class Reconnections:
     def add(self, bus: Bus, hints: Hints, reopen: Reopen | None, port: str, newcomer: Newcomer | None = None) -> None:
         """Try this bus again whenever it is lost, where that is wanted and possible."""
         if self.wanted and reopen is not None:
-            self._ways[bus.name] = Way(hints, reopen, port, newcomer)
+            self._ways[bus.name] = ReconnectWay(hints, reopen, port, newcomer)
 
     def rename(self, before: str, now: str) -> None:
         """Know a bus by its new name. It must not be lost."""
@@ -224,7 +224,7 @@ class Reconnections:
         self._tasks[bus.name] = asyncio.get_running_loop().create_task(self._try(bus, self._ways[bus.name]))
         return True
 
-    async def _try(self, bus: Bus, way: Way) -> None:
+    async def _try(self, bus: Bus, way: ReconnectWay) -> None:
         trouble: list[str] = []
         try:
             with isolated(f"the return of {bus.name}", trouble):
@@ -251,7 +251,7 @@ class Reconnections:
 class _Return:
     """The attempts for one loss of one bus."""
 
-    def __init__(self, bus: Bus, way: Way, say: Say) -> None:
+    def __init__(self, bus: Bus, way: ReconnectWay, say: Say) -> None:
         self._bus, self._way = bus, way
         self._publish = say
         self._since = bus.now()
@@ -275,7 +275,7 @@ class _Return:
         if self._unread:
             names = ", ".join(each.shown for each in self._unread)
             self._say(f"{bus.name}: not known whether these move, as they were not read yet: {names}")
-        pauses = Pauses(FIRST, LONGEST)
+        pauses = Pauses(FIRST_RETRY_PAUSE, LONGEST_RETRY_PAUSE)
         while True:
             await asyncio.sleep(pauses.now)
             if newcomer is not None and bus.drives and bus.lost is None:
@@ -286,11 +286,11 @@ class _Return:
             except Stopped:
                 pauses.lengthen(GLANCE)
             except DriveError as failure:  # after a search of some seconds
-                pauses.begin(FIRST)
+                pauses.begin(FIRST_RETRY_PAUSE)
                 if newcomer is None:
                     self._failed(str(failure))
                 elif newcomer.silent(failure):
-                    pauses.begin(SILENT)
+                    pauses.begin(SILENT_PAUSE)
                 else:
                     return
             except TransportLost as failure:

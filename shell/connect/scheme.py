@@ -138,14 +138,14 @@ class Scheme(ABC):
         from multidrop.transports.ssh import WORD
 
         example = f"as in {self.name}://10.0.0.5:{self.port or 2217}"
-        found = re.fullmatch(rf"//(\[[0-9A-Fa-f:.]+\]|{WORD})(?::(\d+))?/?", body)
-        if found is None:
+        match = re.fullmatch(rf"//(\[[0-9A-Fa-f:.]+\]|{WORD})(?::(\d+))?/?", body)
+        if match is None:
             raise Diagnostic(f"{self.name}: needs //HOST:PORT", text, example)
-        port = whole(found[2], 1, 65535) if found[2] else self.port or None
+        port = whole(match[2], 1, 65535) if match[2] else self.port or None
         if port is None:
-            what = f"no port {found[2]}; valid: 1 to 65535" if found[2] else "no port"
+            what = f"no port {match[2]}; valid: 1 to 65535" if match[2] else "no port"
             raise Diagnostic(what, text, example)
-        return found[1].strip("[]"), port
+        return match[1].strip("[]"), port
 
     def in_folder(self, connection: Connection, folder: str) -> Connection:
         """Start a relative path at the folder of the file that has the URL; empty: the current one."""

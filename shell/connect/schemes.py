@@ -126,15 +126,15 @@ class Ssh(Scheme):
         from multidrop.transports.ssh import WORD, wrong_path
 
         example = "as in ssh://user@host/dev/ttyUSB0"
-        found = re.fullmatch(rf"//(?:({WORD})@)?(\[[0-9A-Fa-f:.]+\]|{WORD})(?::(\d+))?(/.*)?", body, re.DOTALL)
-        if found is None:
+        match = re.fullmatch(rf"//(?:({WORD})@)?(\[[0-9A-Fa-f:.]+\]|{WORD})(?::(\d+))?(/.*)?", body, re.DOTALL)
+        if match is None:
             raise Diagnostic("ssh: needs //[USER@]HOST[:PORT] and the path of a port there", base.text, example)
-        if (port := whole(found[3], 1, 65535) if found[3] else 0) is None:
-            raise Diagnostic(f"no port {found[3]}; valid: 1 to 65535", base.text, example)
-        path = unquote(found[4] or "")
+        if (port := whole(match[3], 1, 65535) if match[3] else 0) is None:
+            raise Diagnostic(f"no port {match[3]}; valid: 1 to 65535", base.text, example)
+        path = unquote(match[4] or "")
         if wrong := wrong_path(path):
-            raise Diagnostic(f"{wrong}, on {found[2]}", base.text, example)
-        return replace(base, user=found[1] or "", host=found[2].strip("[]"), port=port, target=path)
+            raise Diagnostic(f"{wrong}, on {match[2]}", base.text, example)
+        return replace(base, user=match[1] or "", host=match[2].strip("[]"), port=port, target=path)
 
     def short(self, connection: Connection) -> str:
         return f"{connection.host}-{last_part(connection.target)}"
@@ -207,16 +207,16 @@ def _far_port(connection: Connection) -> FarPort:
     return FarPort(connection.host, connection.target, connection.user, connection.port)
 
 
-CORE: Mapping[str, Scheme] = {each.name: each for each in (Serial(), Tcp(), Udp(), Rfc2217(), Ssh(), Sim())}
+CORE: Mapping[str, Scheme] = {scheme.name: scheme for scheme in (Serial(), Tcp(), Udp(), Rfc2217(), Ssh(), Sim())}
 """The schemes of the core, by name."""
 SAVED = "the name of a saved connection"
 
 
 def schemes() -> dict[str, Scheme]:
     """All schemes by name, those of features among them."""
-    added = {each.name: each for each in registry.added(Scheme) if each.name not in CORE}  # type: ignore[type-abstract]
+    added = {scheme.name: scheme for scheme in registry.added(Scheme) if scheme.name not in CORE}  # type: ignore[type-abstract]
     names = [*CORE]
-    registry.place({name: each.after for name, each in added.items()}, names)
+    registry.place({name: scheme.after for name, scheme in added.items()}, names)
     known = {**added, **CORE}
     return {name: known[name] for name in names}
 
@@ -229,30 +229,30 @@ def named(name: str) -> Scheme | None:
     if name in CORE:
         return CORE[name]
     answering = registry.answering(Scheme, f"{name}:")  # type: ignore[type-abstract]
-    return next((each for each in answering if each.name == name), None)
+    return next((scheme for scheme in answering if scheme.name == name), None)
 
 
 def no_line(name: str) -> NoLine | None:
     """Find what is said of a kind of URL that leads to no drives; None: there is no such kind."""
-    return next((each for each in registry.answering(NoLine, f"{name}:") if name in each.names), None)
+    return next((declared for declared in registry.answering(NoLine, f"{name}:") if name in declared.names), None)
 
 
 def sentence() -> str:
     """All forms in one line."""
-    return f"a port, {', '.join(each.example for each in schemes().values())} or {SAVED}"
+    return f"a port, {', '.join(scheme.example for scheme in schemes().values())} or {SAVED}"
 
 
 def table() -> list[str]:
     """All forms, a line each."""
     forms = schemes().values()
-    width = max(len(each.example) for each in forms)
-    return [f"  {each.example:<{width}}  {each.meaning}" for each in forms]
+    width = max(len(form.example) for form in forms)
+    return [f"  {form.example:<{width}}  {form.meaning}" for form in forms]
 
 
 def local_ports() -> Iterator[PortInfo]:
     """The ports of this machine, of all schemes. The search may be slow."""
-    for each in schemes().values():
+    for scheme in schemes().values():
         try:
-            yield from each.ports()
+            yield from scheme.ports()
         except Diagnostic as problem:  # by others
             registry.warn(str(problem))

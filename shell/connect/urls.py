@@ -30,13 +30,13 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
     """Parse a URL, a bare port or a saved name. Raises Diagnostic, which never holds a password."""
     text = text.strip()
     if saved and text in saved:
-        found = saved[text]
+        kept = saved[text]
         try:
-            connection = parse(found.url)
-            connection = connection.scheme.in_folder(connection, found.folder)
-            return replace(connection, name=found.name, labels=found.names)
+            connection = parse(kept.url)
+            connection = connection.scheme.in_folder(connection, kept.folder)
+            return replace(connection, name=kept.name, labels=kept.names)
         except Diagnostic as problem:
-            raise Diagnostic(str(problem), f"connection {found.name}") from None
+            raise Diagnostic(str(problem), f"connection {kept.name}") from None
     try:
         return _parsed(text)
     except Diagnostic as problem:
@@ -48,33 +48,33 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
 
 def wrong_urls(connections: Iterable[SavedConnection]) -> Iterator[str]:
     """What is wrong with the URLs of saved connections, each with its key."""
-    for each in connections:
+    for connection in connections:
         try:
-            parse(each.url)
+            parse(connection.url)
         except Diagnostic as problem:
-            yield f"connections.{each.name}.url: {problem}"
+            yield f"connections.{connection.name}.url: {problem}"
 
 
 def _parsed(text: str) -> Connection:
     scheme, rest = _scheme(text)
     # The query and the fragment come in either order, as in `sim:#press?em=1`.
-    found = re.fullmatch(r"([^?#]*)(?:\?([^#]*))?(?:#([^?]*))?(?:\?(.*))?", rest, re.DOTALL)
-    if found is None or (found[2] is not None and found[4] is not None):
+    match = re.fullmatch(r"([^?#]*)(?:\?([^#]*))?(?:#([^?]*))?(?:\?(.*))?", rest, re.DOTALL)
+    if match is None or (match[2] is not None and match[4] is not None):
         raise Diagnostic("more than one ? or #", rest)
-    body, query, fragment = found[1], found[2] or found[4] or "", found[3] or ""
+    body, query, fragment = match[1], match[2] or match[4] or "", match[3] or ""
     if fragment and not scheme.simulated:
         raise Diagnostic(f"#{fragment} names a bus of a simulated cell", text, "valid only with sim:")
     return _with_query(scheme.parse(Connection(scheme, text, bus=fragment), body), query)
 
 
 def _scheme(text: str) -> tuple[Scheme, str]:
-    found = re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", text)
-    if found and (scheme := named(found[1].lower())) is not None:
-        return scheme, text[found.end() :]
-    if found and (elsewhere := no_line(found[1].lower())) is not None:
+    match = re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", text)
+    if match and (scheme := named(match[1].lower())) is not None:
+        return scheme, text[match.end() :]
+    if match and (elsewhere := no_line(match[1].lower())) is not None:
         raise Diagnostic(elsewhere.what, text, elsewhere.hint)
-    if found and text[found.end() :].startswith("//"):
-        raise Diagnostic(f"no kind of connection {found[1]}://", text, f"valid: {sentence()}")
+    if match and text[match.end() :].startswith("//"):
+        raise Diagnostic(f"no kind of connection {match[1]}://", text, f"valid: {sentence()}")
     path = text.partition("?")[0]
     if "/" in path or re.match(r"[.~]|COM\d+$", path, re.IGNORECASE):  # the path or the name of a serial port
         return CORE["serial"], text
@@ -87,7 +87,7 @@ def _choice(*allowed: str) -> tuple[Callable[[str], Any], Callable[[], str]]:
 
 def _chosen() -> list[str]:
     """The languages that `dialect=` names."""
-    return [name for name, each in dialects().items() if not each.scheme]
+    return [name for name, dialect in dialects().items() if not dialect.scheme]
 
 
 def _dialect(value: str) -> str | None:
@@ -144,16 +144,16 @@ def _with_query(connection: Connection, query: str) -> Connection:
         name, read, allowed = KEYS[key]
         if name in values:
             raise Diagnostic(f"{key} is given twice", connection.text)
-        found = read(unquote(value))
-        if found is None:
+        setting = read(unquote(value))
+        if setting is None:
             what = f"no {key} {value}" if value else f"no value for {key}"
             raise Diagnostic(what, connection.text, f"valid: {allowed()}")
-        values[name] = CONVERT.get(name, lambda same: same)(found)
+        values[name] = CONVERT.get(name, lambda same: same)(setting)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
         raise Diagnostic("address=none allows one drive only", connection.text, "drop one of the keys")
     if "relay" in values and not connection.scheme.relayed:
         raise Diagnostic("relay= is valid only with ssh://", connection.text, "drop relay=")
-    if own := next((name for name, each in dialects().items() if each.scheme == connection.scheme.name), ""):
+    if own := next((name for name, dialect in dialects().items() if dialect.scheme == connection.scheme.name), ""):
         if "family" in values:
             raise Diagnostic(f"dialect= is not valid with {connection.scheme.prefix}", connection.text, "drop dialect=")
         values["family"] = own

@@ -7,18 +7,18 @@ from collections.abc import Callable
 
 from multidrop.dialects import DriveState
 from multidrop.dialects.families import seen
-from multidrop.dialects.scanning import Outcome, Reach, Scan
+from multidrop.dialects.scanning import Reach, Scan, SearchOutcome
 from multidrop.drives.bus import Bus
 
-LEAST, TIMES = 12.0, 4.0
+LEAST_SECONDS, TIMES_AS_LONG = 12.0, 4.0
 """A search may take this long, s, and this many times its estimate; each drive that is found gives it that again."""
 
 
 async def searched(
     bus: Bus, scan: Scan, reach: Reach, found: Callable[[DriveState], None], step: Callable[[], None]
-) -> Outcome:
+) -> SearchOutcome:
     """Search a bus. A search that the noise on its line makes too long ends, and its remark says what came."""
-    limit = LEAST + TIMES * scan.seconds(reach, round(bus.line.baud) or None)
+    limit = LEAST_SECONDS + TIMES_AS_LONG * scan.seconds(reach, round(bus.line.baud) or None)
     now = asyncio.get_running_loop().time
     with bus.link.received() as heard:
         try:
@@ -31,4 +31,4 @@ async def searched(
                 return await bus.search(scan.search(reach, another, step))
         except TimeoutError:
             why = f", as the line is never quiet; {seen(bytes(heard), bus.roster.family.name)}" if heard else ""
-            return Outcome((f"given up after {limit:.0f} s before every address was asked{why}",))
+            return SearchOutcome((f"given up after {limit:.0f} s before every address was asked{why}",))

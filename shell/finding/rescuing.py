@@ -93,9 +93,9 @@ class Rescue:
         hazards = f"the next step goes on with {listed(others)}; {HAZARD}; it stops every drive, and erases nothing"
         await self._workspace.questions.confirm(hazards, self._scanning.port, SO_FAR)
         await self._scanning.search(others, False, hasty=True)
-        for each in others:
+        for stage in others:
             if not self._scanning.found:
-                await self._cleared(each)
+                await self._cleared(stage)
 
     async def _cleared(self, stage: Stage) -> None:
         assert stage.scan.clears
@@ -153,18 +153,18 @@ class Rescue:
 
     async def _erase(self, stages: Sequence[Stage], agreed: bool) -> None:
         """Set every drive to factory defaults, after a question of its own."""
-        erasing = [each for each in stages if each.scan.erases]
+        erasing = [stage for stage in stages if stage.scan.erases]
         asks = self._workspace.front.ask is not None and not self._workspace.questions.agreed
         if not erasing or not (agreed or asks):
             self._say("nothing short of erasing is left; multidrop rescue --erase goes as far as FD")
             return
         self._say_step("FD: factory defaults")
         await self._workspace.questions.confirm(ERASES, self._scanning.port, SO_FAR)
-        defaults = [each for each in erasing if each.baud in (None, FAMILIES[each.family].baud)]
-        for each in erasing:
-            assert each.scan.erases
-            await self._scanning.converse(self._scanning.connection(each), each.scan.erase)
-            await self._scanning.search(list(dict.fromkeys([each, *defaults])), False)
+        defaults = [stage for stage in erasing if stage.baud in (None, FAMILIES[stage.family].baud)]
+        for stage in erasing:
+            assert stage.scan.erases
+            await self._scanning.converse(self._scanning.connection(stage), stage.scan.erase)
+            await self._scanning.search(list(dict.fromkeys([stage, *defaults])), False)
             if self._scanning.found:
                 return
 

@@ -24,14 +24,14 @@ from multidrop.drives.silence import explained
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
-from multidrop.shell.connect.opening import Opened, Opener
+from multidrop.shell.connect.opening import OpenedBus, Opener
 from multidrop.shell.connect.scheme import Connection
 from multidrop.shell.connect.urls import with_echo
 from multidrop.shell.finding.limits import searched
 from multidrop.shell.state.port_state import memory_of
 from multidrop.shell.workspace import Workspace
 
-SLOWEST = 0.2
+LONGEST_NETWORK_DELAY = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""
 SPREAD, JITTER = 2.0, 0.02
 """Over a network, a reply may take this many times as long as the measured one, and this time, s, more."""
@@ -96,7 +96,7 @@ class FoundDrive:
 
 def url_of(found: Sequence[FoundDrive]) -> str:
     """The URL that opens the first drive, with those of its language, baud rate and mode on its port."""
-    found = [each for each in found if each.form == found[0].form]
+    found = [drive for drive in found if drive.form == found[0].form]
     connection, codec = found[0].connection, found[0].state.codec
     if connection.scheme.direct:
         return found[0].port
@@ -108,7 +108,7 @@ def url_of(found: Sequence[FoundDrive]) -> str:
     party = getattr(codec, "party", None)
     if party is not None and not connection.scheme.alone:
         keys.append(f"party={int(party)}")
-    if names := [each.state.address for each in found if each.state.address]:
+    if names := [drive.state.address for drive in found if drive.state.address]:
         keys.append(f"drives={','.join(names)}")
     elif party is None:
         keys.append("address=none")
@@ -134,9 +134,9 @@ class Stage(NamedTuple):
 
     @property
     def scan(self) -> Scan:
-        found = FAMILIES[self.family].scan()
-        assert found is not None
-        return found
+        scan = FAMILIES[self.family].scan()
+        assert scan is not None
+        return scan
 
     @property
     def words(self) -> str:
@@ -217,7 +217,7 @@ class Scanning:
 
     def about(self, stages: Iterable[Stage]) -> str:
         """The time that a search takes, where no drive replies."""
-        return f"about {round(sum(each.scan.seconds(self._reach(), each.baud) for each in stages))} s"
+        return f"about {round(sum(stage.scan.seconds(self._reach(), stage.baud) for stage in stages))} s"
 
     def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""
@@ -231,9 +231,9 @@ class Scanning:
                 raise Diagnostic("the port has no baud rate", given.text, "drop --baud")
             return stages
         return [
-            Stage(each.family, baud)
-            for each in stages
-            for baud in dict.fromkeys(bauds or (given.baud or FAMILIES[each.family].baud, *each.scan.bauds))
+            Stage(stage.family, baud)
+            for stage in stages
+            for baud in dict.fromkeys(bauds or (given.baud or FAMILIES[stage.family].baud, *stage.scan.bauds))
         ]
 
     async def search(self, stages: Sequence[Stage], everything: bool, hasty: bool = False) -> None:
@@ -272,7 +272,7 @@ class Scanning:
         At a wrong rate it is an error, and an OE subroutine may move its drive: so the first ones follow again. What
         replied is read in the end, because that takes as long as a drive slows down.
         """
-        replied = [_stage_of(each.connection) for each in self.found]
+        replied = [_stage_of(drive.connection) for drive in self.found]
         memory, _ = memory_of(self._workspace.settings.state, self._connection.port_name)
         named = self._connection.hints.family in ("", DEFAULT)
         remembered = [Stage(DEFAULT, memory.baud)] if named and memory.drives and memory.baud else []
@@ -283,7 +283,11 @@ class Scanning:
         for stage in likely if others else dict.fromkeys([*replied, *self._woken]):
             await self._stop_at(stage, confirm=True)
         if self._stopped:
-            left_out = [each for each in self.stages(()) if each not in {**self._stopped, **self._agreed_to}]
+            left_out = [
+                other_stage
+                for other_stage in self.stages(())
+                if other_stage not in {**self._stopped, **self._agreed_to}
+            ]
             why = f"; not with {listed(left_out)}: no search there was agreed to" if left_out else ""
             tally = stop_report.of_halts(self._read, self._workspace.wall(self._workspace.stopped_at), False)
             read = f"; {stop_report.words(tally)}" if tally.found else ""
@@ -299,25 +303,25 @@ class Scanning:
         except TransportLost as loss:
             self._warn(self.port, [f"NO STOP SENT with {stage.words}: {loss}"])
             return
-        for each in opened:
-            async with self._adopted(each, stage):
-                for found in self.found:
-                    if _stage_of(found.connection) == stage:
-                        each.bus.roster.found(found.state)
-                roster, woken = each.bus.roster, self._woken.get(stage, {})
+        for opening in opened:
+            async with self._adopted(opening, stage):
+                for found_drive in self.found:
+                    if _stage_of(found_drive.connection) == stage:
+                        opening.bus.roster.found(found_drive.state)
+                roster, woken = opening.bus.roster, self._woken.get(stage, {})
                 for name in woken:
                     roster.found(roster.family.new_state(roster.family.codec, name))
                 asked = [name for name in self._asked.get(stage, ()) if name not in roster.drives]
                 roster.sweep = () if confirm else tuple(stage.scan.stop(asked))
-                with each.bus.link.received() as heard:
-                    await self._halted(each.bus, stage, confirm)
+                with opening.bus.link.received() as heard:
+                    await self._halted(opening.bus, stage, confirm)
                 replied = roster.family.in_frames(bytes(heard)) if roster.sweep else ()
                 if new := [name for name in replied if name not in roster.drives]:
                     self._woken[stage] = woken | dict.fromkeys(new)
                     roster.sweep = ()
                     for name in new:
                         roster.found(roster.family.new_state(roster.family.codec, name))
-                    await self._halted(each.bus, stage, False)
+                    await self._halted(opening.bus, stage, False)
 
     async def _halted(self, bus: Bus, stage: Stage, confirm: bool) -> None:
         """Stop a bus, and wait until the whole stop has left; `confirm`: read the drives that are listed."""
@@ -343,13 +347,13 @@ class Scanning:
     async def opened(self, connection: Connection) -> AsyncIterator[Bus]:
         """Open the port, of several simulated buses the first, and close it in the end; a stop reaches it meanwhile."""
         opened, *others = await self._opener(connection, str)
-        for each in others:
-            await each.bus.close()
+        for opening in others:
+            await opening.bus.close()
         async with self._adopted(opened, _stage_of(connection)) as bus:
             yield bus
 
     @asynccontextmanager
-    async def _adopted(self, opened: Opened, stage: Stage) -> AsyncIterator[Bus]:
+    async def _adopted(self, opened: OpenedBus, stage: Stage) -> AsyncIterator[Bus]:
         """Have a stop reach a bus, and close it in the end."""
         bus = opened.bus
         self._tried[stage] = None
@@ -370,13 +374,13 @@ class Scanning:
 
     def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
         """Make the failure that names what was tried."""
-        found = NothingFound(
+        nothing = NothingFound(
             f"no drive replies on {self.port} ({listed(stages)}; {stages[0].scan.asked(self._reach())}){advice}"
         )
         if self._first is None:
-            return found
+            return nothing
         link, family = self._first.link, self._first.roster.family
-        return silent(explained(found, link, family.name), link, family)
+        return silent(explained(nothing, link, family.name), link, family)
 
     def _reach(self, distance: float = 0.0, hasty: bool = False) -> Reach:
         """The manner of the search. `distance`: the time of the network to a drive and back, s."""
@@ -398,15 +402,15 @@ class Scanning:
 
         connection, began = self.connection(stage), self._workspace.now()
         buses = await self._opener(connection, str)
-        distance = min((self._workspace.now() - began) * connection.scheme.turns, SLOWEST)
+        distance = min((self._workspace.now() - began) * connection.scheme.turns, LONGEST_NETWORK_DELAY)
         if (trip := buses[0].bus.link.transport.round_trip) is not None:
             distance = SPREAD * trip + JITTER
         async with AsyncExitStack() as open_:
-            for each in buses:
-                await open_.enter_async_context(self._adopted(each, stage))
-            for each in buses:
+            for bus in buses:
+                await open_.enter_async_context(self._adopted(bus, stage))
+            for bus in buses:
                 self._done = begun
-                await self._searched(each, stage, self._reach(distance, hasty), step)
+                await self._searched(bus, stage, self._reach(distance, hasty), step)
 
     def _repeats(self) -> None:
         """Note that the adapter repeats what it sends: every stage opens its port with echo=local from now on."""
@@ -415,7 +419,7 @@ class Scanning:
             text = "the adapter repeats what it sends; the URLs that are found have echo=local"
             self._warn(self._connection.scheme.shown(self._connection), [text])
 
-    async def _searched(self, opened: Opened, stage: Stage, reach: Reach, step: Callable[[], None]) -> None:
+    async def _searched(self, opened: OpenedBus, stage: Stage, reach: Reach, step: Callable[[], None]) -> None:
         """Search one bus."""
         bus, hints = opened.bus, opened.hints
         port = self._connection.scheme.shown(self._connection, bus.name)
@@ -423,9 +427,9 @@ class Scanning:
 
         def found(state: DriveState) -> None:
             bus.roster.probes(state.address)
-            each = FoundDrive(self.connection(stage), port, state)
-            self.found.append(each)
-            self._report(each)
+            drive = FoundDrive(self.connection(stage), port, state)
+            self.found.append(drive)
+            self._report(drive)
             self._warn(port, state.take_messages()[0])
 
         def asks(address: str) -> None:
@@ -440,8 +444,8 @@ class Scanning:
         self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, self._other)))
 
     def _warn(self, where: str, texts: Iterable[str]) -> None:
-        for each in texts:
-            self._workspace.notify(f"{where}: {each}", warning=True)
+        for text in texts:
+            self._workspace.notify(f"{where}: {text}", warning=True)
 
 
 def _stage_of(connection: Connection) -> Stage:
@@ -455,9 +459,9 @@ async def extend(workspace: Workspace, bus: Bus) -> list[str]:
         raise Diagnostic(f"{bus.name}: its drives cannot be searched for", hint="/open URL names them in drives=")
     if "" in bus.drives:
         raise Diagnostic(f"{bus.name}: its drive takes no address", hint="no other drive can share its line")
-    if storing := [each.address for each in bus.all_drives if each.programming]:
+    if storing := [drive.address for drive in bus.all_drives if drive.programming]:
         raise Diagnostic(f"{bus.name}: {storing[0]} is in program mode", hint=f"@{storing[0]} PG ends it")
-    found: list[DriveState] = []
+    states: list[DriveState] = []
     reach = Reach(known=tuple(bus.drives))
     total, done = scan.places(reach), 0
 
@@ -467,17 +471,17 @@ async def extend(workspace: Workspace, bus: Bus) -> list[str]:
         job(done, total)
 
     with running(workspace, f"{bus.name}: scan") as job:
-        outcome = await searched(bus, scan, reach, found.append, step)
-    for each in outcome.remarks:
-        workspace.notify(f"{bus.name}: {each}", bus=bus.name, warning=True)
-    await bus.add(found)
-    return [state.address for state in found]
+        outcome = await searched(bus, scan, reach, states.append, step)
+    for remark in outcome.remarks:
+        workspace.notify(f"{bus.name}: {remark}", bus=bus.name, warning=True)
+    await bus.add(states)
+    return [state.address for state in states]
 
 
 def listed(stages: Iterable[Stage]) -> str:
     """Stages in words: `LANGUAGE at 4800, 19200 baud and OTHER at 9600 baud`."""
     by_family: dict[str, list[str]] = {}
-    for each in stages:
-        by_family.setdefault(each.scan.title, []).extend([str(each.baud)] if each.baud else [])
+    for stage in stages:
+        by_family.setdefault(stage.scan.title, []).extend([str(stage.baud)] if stage.baud else [])
     parts = [f"{title} at {', '.join(bauds)} baud" if bauds else title for title, bauds in by_family.items()]
     return " and ".join(parts)

@@ -14,7 +14,7 @@ from multidrop.dialects.codec import copy_with
 from multidrop.dialects.families import family_of
 from multidrop.dialects.family import Motion
 from multidrop.dialects.state import DriveState
-from multidrop.shell.log.steps import Exchange, Step
+from multidrop.shell.log.steps import LoggedPoll, LoggedStep
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -23,7 +23,7 @@ WORDS = {"P": "", "PX": "x", "PY": "y"}
 """The axis of the words that print a position."""
 
 
-class Measured(NamedTuple):
+class MeasuredPosition(NamedTuple):
     """The measured position of an axis of a drive."""
 
     where: str
@@ -48,16 +48,16 @@ class Decoding:
         self._procedure: Procedure[tuple[Motion, ...]] | None = None
         self._request: Request | None = None
 
-    def take(self, poll: Exchange) -> Iterator[Measured]:
+    def take(self, poll: LoggedPoll) -> Iterator[MeasuredPosition]:
         """Take a request with its reply; yield what the drive's motion was once that is known."""
         try:
             result = self._step(poll)
         except DriveError:  # it is in program mode now, or the reply was damaged then, too
             self._request, result = None, ()
-        for each in result:
-            yield Measured(poll.where, poll.at, each.axis, each.position, each.velocity)
+        for motion in result:
+            yield MeasuredPosition(poll.where, poll.at, motion.axis, motion.position, motion.velocity)
 
-    def _step(self, poll: Exchange) -> tuple[Motion, ...]:
+    def _step(self, poll: LoggedPoll) -> tuple[Motion, ...]:
         """Go on with the conversation that the request belongs to, or begin one; return its result at its end."""
         try:
             if self._request is None or not self._fits(self._request, poll):
@@ -67,15 +67,15 @@ class Decoding:
             if self._fits(request, poll) and self._procedure is not None:
                 numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
                 codec, received = request.codec, poll.received
-                if (found := codec.decode(numbered, received) or codec.on_quiet(numbered, received)) is not None:
-                    self._request = self._procedure.send(copy_with(found.reply, raw=received[: found.used]))
+                if (decoded := codec.decode(numbered, received) or codec.on_quiet(numbered, received)) is not None:
+                    self._request = self._procedure.send(copy_with(decoded.reply, raw=received[: decoded.used]))
         except StopIteration as done:
             motion: tuple[Motion, ...] = done.value
             return motion
         return ()
 
     @staticmethod
-    def _fits(request: Request | None, poll: Exchange) -> bool:
+    def _fits(request: Request | None, poll: LoggedPoll) -> bool:
         """Whether a request has these bytes. The number of one that has a number begins its bytes."""
         if request is None:
             return False
@@ -83,10 +83,10 @@ class Decoding:
         return request.codec.encode(numbered) == poll.sent
 
 
-def printed(step: Step, drive: Drive) -> Iterator[Measured]:
+def printed(step: LoggedStep, drive: Drive) -> Iterator[MeasuredPosition]:
     """Yield the position that a line has printed."""
     questions = {drive.family.question(word): axis for word, axis in WORDS.items()}
     axis = questions.get(" ".join(step.text.upper().split()))
     position = whole(step.printed[0].strip(), -(2**31), 2**31 - 1) if len(step.printed) == 1 else None
     if axis is not None and position is not None:
-        yield Measured(step.where, step.at, axis, position, None)
+        yield MeasuredPosition(step.where, step.at, axis, position, None)

@@ -54,7 +54,7 @@ _MARKS = ("poll", "warning", "raw", "stop", "marks")
 
 
 @dataclass(frozen=True)
-class Entry:
+class LogEntry:
     """One fact. `text` holds bytes as Latin-1 where the kind is in TRAFFIC."""
 
     time: datetime
@@ -77,7 +77,7 @@ class Entry:
     """The entries after this one have `command` and `stop`, which older versions did not write."""
 
 
-def line_of(entry: Entry) -> bytes:
+def line_of(entry: LogEntry) -> bytes:
     fields: dict[str, Any] = {"time": entry.time.isoformat(timespec="microseconds"), "kind": entry.kind}
     if entry.bus:
         fields["bus"] = entry.bus
@@ -94,7 +94,7 @@ def line_of(entry: Entry) -> bytes:
     return json.dumps(fields).encode() + b"\n"
 
 
-def entry_of(line: bytes) -> Entry | None:
+def entry_of(line: bytes) -> LogEntry | None:
     """Decode a line; None for anything that `line_of` does not make."""
     try:
         fields = json.loads(line)
@@ -103,13 +103,13 @@ def entry_of(line: bytes) -> Entry | None:
             return None
         names = ("time", "bytes" if kind in TRAFFIC else "text", "bus", "drive", "by", "command")
         time, text, bus, drive, by, command = (fields.get(name, "") for name in names)
-        if not all(isinstance(each, str) for each in (time, text, bus, drive, by, command)):
+        if not all(isinstance(field, str) for field in (time, text, bus, drive, by, command)):
             return None
         at = datetime.fromisoformat(time)
-        if at.tzinfo is None or (kind in TRAFFIC and any(ord(each) > 0xFF for each in text)):
+        if at.tzinfo is None or (kind in TRAFFIC and any(ord(character) > 0xFF for character in text)):
             return None
         marks = {name: fields.get(name) is True for name in _MARKS}
-        return Entry(at, kind, text, bus, drive, by, command=command, **marks)
+        return LogEntry(at, kind, text, bus, drive, by, command=command, **marks)
     except (ValueError, RecursionError):
         return None
 
@@ -117,18 +117,18 @@ def entry_of(line: bytes) -> Entry | None:
 PROCESS = os.getpid()
 NOTED = 50
 """The number of logs outside the folder that are remembered."""
-ENDING = ".jsonl"
-LONGEST = 1 << 20
+LOG_SUFFIX = ".jsonl"
+LONGEST_LOG_LINE = 1 << 20
 """The longest line that can be an entry, bytes."""
 
 
-class Line(NamedTuple):
+class LogLine(NamedTuple):
     """A line of a log. `entry` is None where it is not one."""
 
     path: Path
     number: int
     data: bytes
-    entry: Entry | None
+    entry: LogEntry | None
 
     @property
     def where(self) -> str:
@@ -146,13 +146,15 @@ def fresh(settings: Settings) -> Path:
         private_folder(place)
         # Remove the oldest logs of the folder until the rest fits.
         total = 0
-        for path in sorted((each for each in place.iterdir() if ENDING in each.name), key=_changed, reverse=True):
+        for path in sorted(
+            (log_path for log_path in place.iterdir() if LOG_SUFFIX in log_path.name), key=_changed, reverse=True
+        ):
             total += path.stat().st_size
             if total > settings.log.size * settings.log.files:
                 path.unlink(missing_ok=True)
     except OSError as problem:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(place)) from None
-    return place / f"{datetime.now():%Y%m%d-%H%M%S}-{PROCESS}{ENDING}"
+    return place / f"{datetime.now():%Y%m%d-%H%M%S}-{PROCESS}{LOG_SUFFIX}"
 
 
 def note(settings: Settings, path: Path) -> None:
@@ -161,9 +163,9 @@ def note(settings: Settings, path: Path) -> None:
         if path.resolve().parent == folder(settings).resolve() or not path.is_file():
             return
         listed = folder(settings) / "elsewhere"
-        known = [each for each in _elsewhere(settings) if each != path.resolve()]
+        known = [other_path for other_path in _elsewhere(settings) if other_path != path.resolve()]
         private_folder(listed.parent)
-        text = "".join(f"{each}\n" for each in [*known, path.resolve()][-NOTED:])
+        text = "".join(f"{other_path}\n" for other_path in [*known, path.resolve()][-NOTED:])
         write_atomically(listed, text.encode("utf-8", "surrogateescape"), 0o600, synced=False, private=True)
 
 
@@ -177,13 +179,13 @@ def _elsewhere(settings: Settings) -> list[Path]:
 
 def newest(settings: Settings) -> Path:
     """The log that was last written. Raises Diagnostic where there is none."""
-    found = [path for path in _elsewhere(settings) if path.is_file()]
+    paths = [path for path in _elsewhere(settings) if path.is_file()]
     with contextlib.suppress(OSError):
-        found += [path for path in folder(settings).iterdir() if path.name.endswith(ENDING)]
-    if not found:
+        paths += [path for path in folder(settings).iterdir() if path.name.endswith(LOG_SUFFIX)]
+    if not paths:
         hint = "/log FILE begins one; [log] always = true in the configuration keeps one of each session"
         raise Diagnostic("no session log yet", str(folder(settings)), hint)
-    return max(found, key=_changed)
+    return max(paths, key=_changed)
 
 
 def _changed(path: Path) -> float:
@@ -206,11 +208,11 @@ def parts(path: Path) -> list[Path]:
     number = 1
     while os.path.exists(part(path, number)):
         number += 1
-    found = [part(path, each) for each in range(number - 1, -1, -1)]
-    return found if number == 1 or os.path.exists(path) else found[:-1]  # rotated, and nothing written since
+    paths = [part(path, earlier) for earlier in range(number - 1, -1, -1)]
+    return paths if number == 1 or os.path.exists(path) else paths[:-1]  # rotated, and nothing written since
 
 
-def lines(path: Path, offset: int = 0, number: int = 0) -> Iterator[Line]:
+def lines(path: Path, offset: int = 0, number: int = 0) -> Iterator[LogLine]:
     """Yield the lines of one file after so many bytes and lines, but those of an index.
 
     Raises Diagnostic where it cannot be read.
@@ -218,19 +220,19 @@ def lines(path: Path, offset: int = 0, number: int = 0) -> Iterator[Line]:
     try:
         with opened(path) as file:
             file.seek(offset)
-            while data := file.readline(LONGEST):
+            while data := file.readline(LONGEST_LOG_LINE):
                 number += 1
                 entry = entry_of(data) if data.endswith(b"\n") else None
                 if entry is None or (entry.kind, entry.text) != ("log", INDEX):
-                    yield Line(path, number, data, entry)
+                    yield LogLine(path, number, data, entry)
     except (OSError, ValueError) as problem:
         raise Diagnostic(f"cannot be read: {why(problem)}", str(path)) from None
 
 
-def whole(path: Path) -> Iterator[Line]:
+def whole(path: Path) -> Iterator[LogLine]:
     """The lines of a log and of its rotated parts, the oldest first. Raises Diagnostic."""
-    for each in parts(path):
-        yield from lines(each)
+    for part in parts(path):
+        yield from lines(part)
 
 
 _FORM = re.compile(rb'\{"time": ".*\}\n', re.S)
@@ -239,18 +241,18 @@ _BEGINS = re.compile(rb'\{"time": "[^"]*", "kind": "log", "text": "' + BEGIN.enc
 
 def damaged(path: Path) -> list[str]:
     """The places of lines in the last session of a log that are no entries, by their form. Raises Diagnostic."""
-    found: list[str] = []
-    for each in parts(path):
+    problems: list[str] = []
+    for part in parts(path):
         try:
-            with opened(each) as file:
-                for number, data in enumerate(iter(partial(file.readline, LONGEST), b""), 1):
+            with opened(part) as file:
+                for number, data in enumerate(iter(partial(file.readline, LONGEST_LOG_LINE), b""), 1):
                     if _BEGINS.match(data):
-                        found = []
+                        problems = []
                     elif not _FORM.fullmatch(data) and data.strip():
-                        found.append(f"{each}:{number}")
+                        problems.append(f"{part}:{number}")
         except (OSError, ValueError) as problem:
-            raise Diagnostic(f"cannot be read: {why(problem)}", str(each)) from None
-    return found
+            raise Diagnostic(f"cannot be read: {why(problem)}", str(part)) from None
+    return problems
 
 
 def left_out(places: Sequence[str], fate: str) -> str:

@@ -80,9 +80,9 @@ def index_of(line: bytes) -> LogIndex | None:
         entries = {EntryKey(*map(str, key)): int(place) for *key, place in found.entries}
         found = found._replace(entries=entries)
         places = [found.base, found.start, found.session, found.resumed or 0, found.before or 0, *entries.values()]
-        sound = all(isinstance(each, int) and 0 <= each <= found.at for each in [*places, found.polls, found.at])
+        sound = all(isinstance(place, int) and 0 <= place <= found.at for place in [*places, found.polls, found.at])
         times = [datetime.fromisoformat(each) for each in (found.first, found.last)]
-        sound = sound and all(each.tzinfo is not None for each in times) and found.base <= found.start
+        sound = sound and all(time.tzinfo is not None for time in times) and found.base <= found.start
         return found if sound and (found.before is None or found.base <= found.before < found.start) else None
     except (ValueError, TypeError, KeyError, RecursionError):
         return None

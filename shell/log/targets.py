@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.line_syntax import EVERYONE, join_target
-from multidrop.shell.log.steps import Exchange, Step
+from multidrop.shell.log.steps import LoggedPoll, LoggedStep
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -17,7 +17,7 @@ Place = tuple[str, str]
 """Bus and address in the log."""
 
 
-def targets(session: Session, steps: Sequence[Step | Exchange]) -> Mapping[tuple[str, str], Drive]:
+def targets(session: Session, steps: Sequence[LoggedStep | LoggedPoll]) -> Mapping[tuple[str, str], Drive]:
     """The drive for each place in the log. Raises Diagnostic."""
     places = dict.fromkeys((step.bus, step.drive) for step in steps if step.bus)
     return {place: _target(session, place, list(places)) for place in places}

@@ -29,13 +29,13 @@ from multidrop.shell.events import (
 )
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.log import files
-from multidrop.shell.log.files import BEGIN, KINDS, TRAFFIC, Entry, line_of
+from multidrop.shell.log.files import BEGIN, KINDS, TRAFFIC, LogEntry, line_of
 from multidrop.shell.log.index import IndexKeeper
 from multidrop.shell.openings import model
 from multidrop.shell.threads import BoundedWriter
 from multidrop.shell.workspace import Workspace
 
-LAST = 50
+MOST_LAST_ENTRIES = 50
 """Entries that are kept for a screen."""
 COMMANDS = (Kind.COMMAND, Kind.SETTING)
 _KINDS = {Printed: "printed", Output: "output", Notified: "notice", Failed: "failed"}
@@ -60,7 +60,7 @@ class SessionLog:
         self._workspace = workspace
         self._stops = workspace.stops
         self._begun = False
-        self._last: deque[Entry] = deque(maxlen=LAST)
+        self._last: deque[LogEntry] = deque(maxlen=MOST_LAST_ENTRIES)
         self._buses: dict[str, str] = {}
         """What was last written of each bus."""
         self._departing: dict[str, Request] = {}
@@ -86,7 +86,7 @@ class SessionLog:
     def last(self, number: int) -> list[str]:
         """The last entries of this session without traffic, a line each, oldest first."""
         kept = list(self._last)[-number:] if number > 0 else []
-        return [f"{each.time:%H:%M:%S} {KINDS[each.kind]:<2} {visible(each.text)}" for each in kept]
+        return [f"{entry.time:%H:%M:%S} {KINDS[entry.kind]:<2} {visible(entry.text)}" for entry in kept]
 
     def _head(self) -> bytes:
         text = f"{'part' if self._begun else BEGIN} of process {files.PROCESS}"
@@ -105,16 +105,16 @@ class SessionLog:
             self._workspace.notify(f"log {self.path}: {problem.strerror}; the log is off now", warning=True)
             self._workspace.changed()
 
-    def _put(self, entries: Iterator[Entry]) -> None:
+    def _put(self, entries: Iterator[LogEntry]) -> None:
         made = list(entries)
-        self._last.extend(each for each in made if each.kind not in TRAFFIC)
+        self._last.extend(entry for entry in made if entry.kind not in TRAFFIC)
         if data := b"".join(map(line_of, made)):
             self._disk.put(data, len(made))
 
-    def _entry(self, at: float, kind: str, text: str, bus: str = "", drive: str = "", **more: object) -> Entry:
-        return Entry(self._workspace.wall(at), kind, text, bus, drive, **more)  # type: ignore[arg-type]
+    def _entry(self, at: float, kind: str, text: str, bus: str = "", drive: str = "", **more: object) -> LogEntry:
+        return LogEntry(self._workspace.wall(at), kind, text, bus, drive, **more)  # type: ignore[arg-type]
 
-    def _entries(self, event: SessionEvent) -> Iterator[Entry]:
+    def _entries(self, event: SessionEvent) -> Iterator[LogEntry]:
         if self._stops != self._workspace.stops:  # a stop came since the last entry
             self._stops = self._workspace.stops
             yield self._entry(self._workspace.stopped_at, "stop", "stop of every drive")
@@ -138,7 +138,7 @@ class SessionLog:
             warning = isinstance(event, Notified) and event.warning
             yield self._entry(event.at, kind, event.text, bus, drive, warning=warning)
 
-    def _changes(self, at: float) -> Iterator[Entry]:
+    def _changes(self, at: float) -> Iterator[LogEntry]:
         now = {name: _described(bus) for name, bus in self._workspace.buses.items()}
         for name in self._buses.keys() - now.keys():
             yield self._entry(at, "bus", "closed", name)
@@ -147,7 +147,7 @@ class SessionLog:
                 yield self._entry(at, "bus", text, name)
         self._buses = now
 
-    def _on_bus(self, bus: str, event: BusEvent | TwinEvent) -> Iterator[Entry]:
+    def _on_bus(self, bus: str, event: BusEvent | TwinEvent) -> Iterator[LogEntry]:
         if isinstance(event, Traffic):
             yield self._traffic(bus, event)
         elif isinstance(event, Sent):
@@ -158,9 +158,9 @@ class SessionLog:
         elif isinstance(event, Unsolicited):
             wall = self._workspace.wall(event.at)
             for text in event.lines:
-                yield Entry(wall, "unsolicited", text, bus)
+                yield LogEntry(wall, "unsolicited", text, bus)
 
-    def _traffic(self, bus: str, event: Traffic) -> Entry:
+    def _traffic(self, bus: str, event: Traffic) -> LogEntry:
         """The bytes, with the drive of the request that they are, or that is in flight."""
         request = self._departing.pop(bus, None) if event.outgoing else self._in_flight.get(bus)
         drive = request.address if request is not None else ""
@@ -174,15 +174,15 @@ class SessionLog:
 
 def _described(bus: Bus) -> str:
     """The port of a bus and its drives, in a line."""
-    found = ", ".join(f"{address} {model(drive)}".strip() for address, drive in bus.drives.items())
-    return f"{bus.link.transport.name}: {found or 'no drive yet'}"
+    drives = ", ".join(f"{address} {model(drive)}".strip() for address, drive in bus.drives.items())
+    return f"{bus.link.transport.name}: {drives or 'no drive yet'}"
 
 
-PATIENCE = 0.05
+WRITE_TIMEOUT = 0.05
 """The longest wait for a write, s."""
-HELD = 1024 * 1024
+MOST_HELD_BYTES = 1024 * 1024
 """The largest number of bytes that wait for a slow disk."""
-ENDING = 1.0
+CLOSE_TIMEOUT = 1.0
 """The longest wait for the rest at the end, s."""
 if sys.platform == "win32":
     import _winapi
@@ -204,8 +204,8 @@ class Disk:
     """A file that is appended to by a thread, rotated at a size, bounded in memory.
 
     Theory of operation. `put` queues bytes and waits for the thread to write them, so that a crash of this program
-    loses nothing that was put. A disk that takes longer than PATIENCE is not waited for again until it has caught up.
-    Meanwhile the queue is bounded; what has no room is counted, and the file says so. Another session may write the
+    loses nothing that was put. A disk that takes longer than WRITE_TIMEOUT is not waited for again until it has caught
+    up. Meanwhile the queue is bounded; what has no room is counted, and the file says so. Another session may write the
     same file: each write begins at its end, and a session follows the other's rotation. The index of a file ends with
     that.
 
@@ -225,7 +225,12 @@ class Disk:
         self._descriptor = _opened(path)
         self._regular = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
         self._writer = BoundedWriter(
-            self._write, lambda loss: missing(loss.count), lambda problem: self._close(), HELD, HELD, "log"
+            self._write,
+            lambda loss: missing(loss.count),
+            lambda problem: self._close(),
+            MOST_HELD_BYTES,
+            MOST_HELD_BYTES,
+            "log",
         )
         self._writer.put(self._gap() + head())
 
@@ -235,14 +240,16 @@ class Disk:
         return self._writer.problem
 
     def put(self, data: bytes, count: int = 1) -> None:
-        """Write `count` entries, which are whole lines. Waits for PATIENCE at most; does nothing after a problem."""
+        """Write `count` entries, which are whole lines. Waits for WRITE_TIMEOUT at most; does nothing after a
+        problem.
+        """
         caught_up = self._writer.idle
         if self._writer.put(data, count=count) and (caught_up or not self._slow):
-            self._slow = not self._writer.wait(PATIENCE)
+            self._slow = not self._writer.wait(WRITE_TIMEOUT)
 
     def close(self) -> None:
-        """Write the rest, for ENDING at most. May be called again."""
-        self._writer.close(ENDING)
+        """Write the rest, for CLOSE_TIMEOUT at most. May be called again."""
+        self._writer.close(CLOSE_TIMEOUT)
 
     def _write(self, data: bytes) -> int:
         rest = self._placed(data) if self._regular else data

@@ -25,7 +25,7 @@ BusName = Annotated[str, Argument(metavar="BUS", listed=(Listed.BUS,))]
 Seconds = Annotated[float, Argument(metavar="SECONDS", read=arguments.duration)]
 Switch = Annotated[str, Argument(metavar="on|off", words={"on": "", "off": ""})]
 NamedValue = Annotated[
-    tuple[str, str], Argument(metavar="NAME=VALUE", read=arguments.named_value, action=arguments.Named)
+    tuple[str, str], Argument(metavar="NAME=VALUE", read=arguments.named_value, action=arguments.NamedValues)
 ]
 """A value of a macro, or a bus for a role of it, behind the macro's name."""
 
@@ -119,7 +119,7 @@ RunLabel = Annotated[str, Argument("the label or program to execute (default: it
 
 
 @dataclass(frozen=True, kw_only=True)
-class Checking:
+class CheckOptions:
     """How program files are checked."""
 
     language: ProgramLanguage = ""

@@ -68,7 +68,7 @@ class United(argparse.Action):
         setattr(chosen, self.dest, values if before is NOT_GIVEN else before | values)
 
 
-class Named(argparse.Action):
+class NamedValues(argparse.Action):
     """Keeps words `NAME=VALUE`, of which each name is given once."""
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: Any, option: object = None) -> None:
@@ -86,10 +86,10 @@ def number(text: str, low: int, high: int, other: str = "") -> int:
     """Read a whole number; `other`: the words that are valid in place of one."""
     from multidrop.base.text import whole
 
-    found = whole(text, low, high)
-    if found is None:
+    value = whole(text, low, high)
+    if value is None:
         raise argparse.ArgumentTypeError(f"{text} is not a number from {low} to {high}{other and f', or {other}'}")
-    return found
+    return value
 
 
 def baud(text: str) -> int:
@@ -109,17 +109,17 @@ def rounds(text: str) -> int | None:
 
 
 def duration(text: str) -> float:
-    found = real(text) or 0.0
-    if not 0 < found <= 1e7:
+    seconds = real(text) or 0.0
+    if not 0 < seconds <= 1e7:
         raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")
-    return found
+    return seconds
 
 
 def speed(text: str) -> float:
-    found = real(text) or 0.0
-    if not 0.001 <= found <= 1000:
+    value = real(text) or 0.0
+    if not 0.001 <= value <= 1000:
         raise argparse.ArgumentTypeError(f"{text} is not a number from 0.001 to 1000")
-    return found
+    return value
 
 
 def one_text(text: str) -> str:
@@ -186,15 +186,15 @@ def _number_of_register(text: str) -> int:
 
 def register_access(text: str) -> Accessed:
     """Read `ADDRESS`, `ADDRESS COUNT` or `ADDRESS =VALUE,VALUE`."""
-    found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", text.strip())
-    if found is None:
+    match = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", text.strip())
+    if match is None:
         raise argparse.ArgumentTypeError("")
-    address = _number_of_register(found[1])
+    address = _number_of_register(match[1])
     if not 0 <= address <= 0xFFFF:
-        raise argparse.ArgumentTypeError(f"no register {found[1]}; valid: 0 to 0xFFFF")
-    if found[2] is None:
-        return Accessed(address, _number_of_register(found[3]) if found[3] else None, None)
-    return Accessed(address, None, [_number_of_register(each.strip()) for each in found[2].split(",")])
+        raise argparse.ArgumentTypeError(f"no register {match[1]}; valid: 0 to 0xFFFF")
+    if match[2] is None:
+        return Accessed(address, _number_of_register(match[3]) if match[3] else None, None)
+    return Accessed(address, None, [_number_of_register(register.strip()) for register in match[2].split(",")])
 
 
 def output_number(text: str) -> int:
@@ -222,10 +222,10 @@ def address(text: str) -> tuple[str, int]:
     from multidrop.base.text import whole
 
     host, _, port = text.rpartition(":")
-    found = whole(port, 0, 65535)
-    if found is None:
+    number = whole(port, 0, 65535)
+    if number is None:
         raise argparse.ArgumentTypeError(f"no port {text!r}; valid: PORT or HOST:PORT")
-    return host.removeprefix("[").removesuffix("]") or HOST, found
+    return host.removeprefix("[").removesuffix("]") or HOST, number
 
 
 # Arguments
@@ -241,21 +241,21 @@ def language_help() -> str:
     from multidrop.dialects.families import DEFAULT, program_languages
 
     known = program_languages()
-    named = (f"{name} for {', '.join(each.endings)}" for name, each in known.items() if name != DEFAULT)
+    named = (f"{name} for {', '.join(files.endings)}" for name, files in known.items() if name != DEFAULT)
     return f"default: {'; '.join(named)}; else {DEFAULT}"
 
 
 def titles() -> str:
     from multidrop.dialects.families import program_languages
 
-    return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
+    return " or ".join(f"{files.title} ({', '.join(files.endings)})" for files in program_languages().values())
 
 
 class CheckedPersonalities:
     """The personalities on which a check of a program depends; a family is imported only to look for one of them."""
 
     def __contains__(self, personality: object) -> bool:
-        return any(personality == each for each in self)
+        return any(personality == known for known in self)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)

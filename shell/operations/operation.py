@@ -37,7 +37,7 @@ class Group(StrEnum):
     SIMULATED = "Simulated drives"
 
 
-class Kind(Enum):
+class VerbKind(Enum):
     """What a verb of scripts is to the lines around it."""
 
     STEP = auto()
@@ -54,9 +54,9 @@ class Kind(Enum):
 
 
 class Scripted(NamedTuple):
-    """What makes a verb one of scripts, which get to it line by line. `do` is given a `shell.scripts.use.Use`."""
+    """What makes a verb one of scripts, which get to it line by line. `do` is given a `shell.scripts.use.LineUse`."""
 
-    kind: Kind = Kind.STEP
+    kind: VerbKind = VerbKind.STEP
     check: Callable[..., None] | None = None
     """Raises Diagnostic for arguments that are wrong before anything is sent. It is given a `Checking` of
     `shell.scripts.use`, and the arguments."""
@@ -153,7 +153,7 @@ class Operation(NamedTuple):
     def claims(self) -> tuple[str, ...]:
         """What only one feature can add."""
         if self.extends:
-            named = self.fixed[:1] or tuple(name for each in self.options for name in each.names)
+            named = self.fixed[:1] or tuple(name for option in self.options for name in option.names)
             return tuple(f"{self.name} {word}" for word in named)
         return tuple(filter(None, (self.verb, self.command)))
 
@@ -176,16 +176,16 @@ class Operation(NamedTuple):
 
     @property
     def places(self) -> tuple[Parameter, ...]:
-        return tuple(each for each in self.arguments if not each.option)
+        return tuple(argument for argument in self.arguments if not argument.option)
 
     @property
     def options(self) -> tuple[Parameter, ...]:
-        return tuple(each for each in self.arguments if each.option)
+        return tuple(argument for argument in self.arguments if argument.option)
 
     @property
     def usage(self) -> str:
         """The fixed words and the arguments of the verb."""
-        return " ".join((*self.fixed, *(each.usage for each in (*self.places, *self.options))))
+        return " ".join((*self.fixed, *(place.usage for place in (*self.places, *self.options))))
 
     def parsed(self, text: str) -> dict[str, Any]:
         """The values of the text behind the fixed words. Raises WrongWords."""
@@ -222,7 +222,7 @@ class Operation(NamedTuple):
     @property
     def takes_urls(self) -> bool:
         """Whether the help on the command explains URLs."""
-        return self.urls or any(Listed.URL in each.argument.listed for each in self.command_arguments)
+        return self.urls or any(Listed.URL in argument.argument.listed for argument in self.command_arguments)
 
     def add_to(self, parser: argparse.ArgumentParser, added: Sequence[Parameter] = ()) -> None:
         """Add the arguments of the command to its parser, with those that features add."""
@@ -231,13 +231,13 @@ class Operation(NamedTuple):
     def command_work(self, chosen: argparse.Namespace, **more: object) -> int:
         """Run the command; return the exit code. `more`: what `do` is given besides its arguments."""
         assert self.do is not None
-        do, found = self.do, values(self.command_arguments, chosen)
-        places, named = gathered(_own(do, int(self.through is not None)), found)
+        do, arguments = self.do, values(self.command_arguments, chosen)
+        places, named = gathered(_own(do, int(self.through is not None)), arguments)
         named |= more
         if self.through is None:
             result = do(*places, **named)
         else:
-            own, names = gathered(_own(self.through, 1), found)
+            own, names = gathered(_own(self.through, 1), arguments)
             result = self.through(lambda first: do(first, *places, **named), *own, **names)
         if iscoroutine(result):
             import asyncio

@@ -21,7 +21,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import GUARD, Kinds
 
 if TYPE_CHECKING:
-    from multidrop.base.foreign import Guard
+    from multidrop.base.foreign import ForeignGuard
 
 Read = Callable[[str], Any]
 """Makes a value of a text, or raises argparse.ArgumentTypeError with what is wrong."""
@@ -176,10 +176,10 @@ def whole(text: str) -> int:
 def real(text: str) -> float:
     from multidrop.base import text as texts
 
-    found = texts.real(text)
-    if found is None:
+    value = texts.real(text)
+    if value is None:
         raise argparse.ArgumentTypeError(f"{text} is not a number")
-    return found
+    return value
 
 
 READERS: Mapping[Any, Read] = {int: whole, float: real}
@@ -190,28 +190,28 @@ def parameters(function: Callable[..., object], given: int = 0, besides: Collect
 
     Raises Diagnostic for an annotation that names what the module does not have, or is none.
     """
-    found = [*inspect.signature(function).parameters.values()][given:]
+    rest = [*inspect.signature(function).parameters.values()][given:]
     scope = getattr(inspect.unwrap(function), "__globals__", {})
-    read = tuple(each for one in found if one.name not in besides for each in _of(one, scope, function))
+    read = tuple(parameter for one in rest if one.name not in besides for parameter in _of(one, scope, function))
     return guarded_as(function, read)
 
 
 def guarded_as(function: Callable[..., Any], those: Iterable[Parameter]) -> tuple[Parameter, ...]:
     """Arguments whose functions are guarded as a function of the same feature is."""
-    guard: Guard | None = getattr(function, GUARD, None)
+    guard: ForeignGuard | None = getattr(function, GUARD, None)
     if guard is None:
         return tuple(those)
     return tuple(
         replace(
-            each,
+            parameter,
             argument=replace(
-                each.argument,
-                help=guard.value(each.argument.help, {}, "help"),
-                read=guard.value(each.argument.read, {"read": READ_RAISES}, "read"),
-                choices=guard.value(each.argument.choices, {}, "choices"),
+                parameter.argument,
+                help=guard.value(parameter.argument.help, {}, "help"),
+                read=guard.value(parameter.argument.read, {"read": READ_RAISES}, "read"),
+                choices=guard.value(parameter.argument.choices, {}, "choices"),
             ),
         )
-        for each in those
+        for parameter in those
     )
 
 
@@ -233,9 +233,9 @@ def _of(one: inspect.Parameter, scope: Mapping[str, Any], function: Callable[...
 def of_fields(kind: type) -> Iterator[Parameter]:
     """The arguments that the fields of a data class are; one by keyword only is an option."""
     scope = vars(inspect.getmodule(kind))
-    for each in fields(kind):
-        found, argument, several = _kind(each.type, scope, f"{each.name} of {kind.__name__}")
-        yield Parameter(each.name, found, argument, _default(each), bool(each.kw_only), several)
+    for data_field in fields(kind):
+        reading, argument, several = _kind(data_field.type, scope, f"{data_field.name} of {kind.__name__}")
+        yield Parameter(data_field.name, reading, argument, _default(data_field), bool(data_field.kw_only), several)
 
 
 def _default(each: Field[Any]) -> Any:
@@ -254,9 +254,9 @@ def _kind(annotation: Any, scope: Mapping[str, Any], where: str) -> tuple[Any, A
     argument = NO_ARGUMENT
     if get_origin(annotation) is Annotated:
         annotation, *notes = get_args(annotation)
-        argument = next((each for each in notes if isinstance(each, Argument)), argument)
+        argument = next((note for note in notes if isinstance(note, Argument)), argument)
     if get_origin(annotation) in (Union, UnionType):
-        inner = [each for each in get_args(annotation) if each is not NoneType]
+        inner = [part for part in get_args(annotation) if part is not NoneType]
         kind, own, several = _kind(inner[0], scope, where)
         return kind, argument if argument is not NO_ARGUMENT else own, several
     if get_origin(annotation) is tuple and get_args(annotation)[-1:] == (...,):
@@ -267,18 +267,18 @@ def _kind(annotation: Any, scope: Mapping[str, Any], where: str) -> tuple[Any, A
 
 def gathered(found: Sequence[Parameter], values: Mapping[str, Any]) -> tuple[list[Any], dict[str, Any]]:
     """The arguments of a call, by place and by name, of the values by name."""
-    by_place = any(each.starred for each in found)
+    by_place = any(parameter.starred for parameter in found)
     places: list[Any] = []
     named: dict[str, Any] = {}
     sets: dict[tuple[str, type], dict[str, Any]] = {}
-    for each in found:
-        value = values[each.name]
-        if each.holder is not None:
-            sets.setdefault(each.holder, {})[each.name] = value
-        elif each.starred:
+    for parameter in found:
+        value = values[parameter.name]
+        if parameter.holder is not None:
+            sets.setdefault(parameter.holder, {})[parameter.name] = value
+        elif parameter.starred:
             places += value
-        elif by_place and not each.option:
+        elif by_place and not parameter.option:
             places.append(value)
         else:
-            named[each.name] = value
+            named[parameter.name] = value
     return places, named | {name: kind(**held) for (name, kind), held in sets.items()}

@@ -22,19 +22,19 @@ def add_parameters(
     does.
     """
     groups: dict[OneOf, argparse._ActionsContainer] = {}
-    for each in _together(parameters):
-        one_of = each.argument.one_of
+    for parameter in _together(parameters):
+        one_of = parameter.argument.one_of
         if one_of is not None and one_of not in groups:
             groups[one_of] = parser.add_mutually_exclusive_group(required=one_of.required)
-        _add(parser if one_of is None else groups[one_of], each, flag)
+        _add(parser if one_of is None else groups[one_of], parameter, flag)
 
 
 def _together(parameters: Sequence[Parameter]) -> list[Parameter]:
     """The arguments, those that exclude each other one after the other: so argparse shows them."""
-    firsts = {each.argument.one_of: number for number, each in reversed([*enumerate(parameters)])}
+    firsts = {parameter.argument.one_of: number for number, parameter in reversed([*enumerate(parameters)])}
     at = {
-        each.name: firsts[each.argument.one_of] if each.argument.one_of is not None else number
-        for number, each in enumerate(parameters)
+        parameter.name: firsts[parameter.argument.one_of] if parameter.argument.one_of is not None else number
+        for number, parameter in enumerate(parameters)
     }
     return sorted(parameters, key=lambda each: at[each.name])
 
@@ -77,14 +77,14 @@ def _note(action: argparse.Action, one: Parameter) -> None:
 
 def values(parameters: Sequence[Parameter], found: argparse.Namespace) -> dict[str, Any]:
     """The values of a parsed line by the names of the arguments."""
-    every = {each.name: getattr(found, each.name) for each in parameters}
-    for each in parameters:
-        if every[each.name] is NOT_GIVEN:
-            every[each.name] = each.default
-        elif each.argument.rest and not isinstance(every[each.name], str):
-            every[each.name] = " ".join(every[each.name])
-        elif each.several:
-            every[each.name] = tuple(every[each.name])
+    every = {parameter.name: getattr(found, parameter.name) for parameter in parameters}
+    for parameter in parameters:
+        if every[parameter.name] is NOT_GIVEN:
+            every[parameter.name] = parameter.default
+        elif parameter.argument.rest and not isinstance(every[parameter.name], str):
+            every[parameter.name] = " ".join(every[parameter.name])
+        elif parameter.several:
+            every[parameter.name] = tuple(every[parameter.name])
     return every
 
 
@@ -93,11 +93,11 @@ class LineParser(argparse.ArgumentParser):
 
     def __init__(self, parameters: Sequence[Parameter]) -> None:
         super().__init__(add_help=False, allow_abbrev=False, exit_on_error=False)
-        self._rest = next((each for each in parameters if each.argument.rest), None)
+        self._rest = next((parameter for parameter in parameters if parameter.argument.rest), None)
         self._parameters = parameters
         self._words: list[str] = []
         """The words that are parsed."""
-        add_parameters(self, [each for each in parameters if each is not self._rest], OnceFlag)
+        add_parameters(self, [parameter for parameter in parameters if parameter is not self._rest], OnceFlag)
 
     def line(self, text: str, where: str) -> dict[str, Any]:
         """Parse a line; return the values by the names of the arguments.
@@ -107,7 +107,9 @@ class LineParser(argparse.ArgumentParser):
         rest: dict[str, Any] = {}
         if self._rest is not None:
             words = []
-            for _ in [each for each in self._parameters if each is not self._rest and not each.option]:
+            for _ in [
+                parameter for parameter in self._parameters if parameter is not self._rest and not parameter.option
+            ]:
                 word, text = divided(text)
                 words += split(word, where)
             if not text and self._rest.required:
@@ -120,20 +122,20 @@ class LineParser(argparse.ArgumentParser):
             words = split(text, where)
         self._words = words
         try:
-            found = self.parse_intermixed_args(words)
+            parsed = self.parse_intermixed_args(words)
         except argparse.ArgumentError as wrong:
             raise WrongWords(_in_words(wrong)) from None
-        return values([each for each in self._parameters if each is not self._rest], found) | rest
+        return values([parameter for parameter in self._parameters if parameter is not self._rest], parsed) | rest
 
     def error(self, message: str) -> NoReturn:
         """Raise WrongWords for words that are missing, or too many."""
         beyond = message.partition("unrecognized arguments: ")[2].split() or self._words
-        option = next((each for each in beyond if self._is_unknown(each)), "")
+        option = next((word for word in beyond if self._is_unknown(word)), "")
         raise WrongWords(f"no option {option.partition('=')[0]}" if option else "")
 
     def _is_unknown(self, word: str) -> bool:
         """Whether a word looks like an option, and is none of these."""
-        known = {name for each in self._parameters if each.option for name in each.names}
+        known = {name for parameter in self._parameters if parameter.option for name in parameter.names}
         looks = len(word) > 1 and word.startswith("-") and not self._negative_number_matcher.match(word)
         return looks and word.partition("=")[0] not in known
 

@@ -33,20 +33,20 @@ D = TypeVar("D", bound=Verb | Operation)
 @cache
 def core() -> tuple[Operation, ...]:
     """The operations of multidrop itself, in the order of their modules."""
-    return tuple(each for module in registry.OPERATIONS for each in imported(f"{module}:OPERATIONS"))
+    return tuple(operation for module in registry.OPERATIONS for operation in imported(f"{module}:OPERATIONS"))
 
 
 def _verbs(those: Iterable[Operation]) -> dict[str, Verb]:
     """Verbs by name, each with its forms."""
-    found: dict[str, list[Operation]] = {}
-    for each in those:
-        if each.verb and each.script is None and not each.extends:
-            found.setdefault(each.name, []).append(each)
-    return {name: Verb(tuple(forms)) for name, forms in found.items()}
+    by_verb: dict[str, list[Operation]] = {}
+    for operation in those:
+        if operation.verb and operation.script is None and not operation.extends:
+            by_verb.setdefault(operation.name, []).append(operation)
+    return {name: Verb(tuple(forms)) for name, forms in by_verb.items()}
 
 
 def _commands(those: Iterable[Operation]) -> dict[str, Operation]:
-    return {each.command: each for each in those if each.command}
+    return {operation.command: operation for operation in those if operation.command}
 
 
 class Declared(Mapping[str, D]):
@@ -87,15 +87,20 @@ class Declared(Mapping[str, D]):
         if name in self.of_core:
             return self._extended(self.of_core[name])
         feature = registry.with_word(name)
-        for each in (feature,) if feature is not None else registry.by_others():
-            if (found := self._added(each).get(name)) is not None:
-                return found
+        for source in (feature,) if feature is not None else registry.by_others():
+            if (declared := self._added(source).get(name)) is not None:
+                return declared
         raise KeyError(name)
 
     def __iter__(self) -> Iterator[str]:
         names = [*self.core_names]
         registry.place(
-            {name: each.after for feature in registry.features() for name, each in self._added(feature).items()}, names
+            {
+                name: declared.after
+                for feature in registry.features()
+                for name, declared in self._added(feature).items()
+            },
+            names,
         )
         return iter(names)
 
@@ -104,19 +109,19 @@ class Declared(Mapping[str, D]):
 
     def __contains__(self, name: object) -> bool:
         """Whether there is such an operation; a feature of the wheel is not imported for that."""
-        if name in self.core_names or any(name in self._added(each) for each in registry.by_others()):
+        if name in self.core_names or any(name in self._added(feature) for feature in registry.by_others()):
             return True
         return name in registry.words() and self._named.fullmatch(str(name)) is not None
 
     def _added(self, feature: Feature) -> Mapping[str, D]:
         return self._by_name(registry.records((feature,), Operation))
 
-    def parts(self, group: str) -> Parts[D]:
+    def parts(self, group: str) -> CommandGroup[D]:
         """The commands of a group by their last word; of "" all first words."""
-        return Parts(self, group)
+        return CommandGroup(self, group)
 
 
-class Parts(Mapping[str, D]):
+class CommandGroup(Mapping[str, D]):
     """The commands of a group, by their last words."""
 
     def __init__(self, every: Declared[D], group: str) -> None:
@@ -139,7 +144,7 @@ class Parts(Mapping[str, D]):
 def _with_forms(verb: Verb) -> Verb:
     """A verb with the forms that features add; none of them is imported for another name."""
     those = (*registry.with_words(f"{verb.name} "), *registry.by_others())
-    added = [each for each in registry.records(those, Operation) if each.extends and each.name == verb.name]
+    added = [record for record in registry.records(those, Operation) if record.extends and record.name == verb.name]
     return verb.extended(added) if added else verb
 
 
@@ -152,13 +157,13 @@ COMMANDS: Declared[Operation] = Declared(_commands, lambda each: each, lambda ea
 @cache
 def script_verbs() -> Mapping[str, Verb]:
     """The verbs that only scripts have, by name, in the order of `/help`."""
-    return {each.name: Verb((each,)) for each in core() if each.script is not None}
+    return {operation.name: Verb((operation,)) for operation in core() if operation.script is not None}
 
 
 def script_verb(name: str) -> Operation | None:
     """A verb of scripts; None for any other word."""
-    found = script_verbs().get(name)
-    return found.main if found is not None else None
+    verb = script_verbs().get(name)
+    return verb.main if verb is not None else None
 
 
 def groups() -> dict[str, list[str]]:
@@ -178,27 +183,31 @@ def _wrong(added: Sequence[Operation]) -> str:
     """What operations by others lack, in words; empty: nothing. Raises Diagnostic, TypeError or ValueError for a wrong
     kind.
     """
-    for each in added:
-        " ".join(each.examples)
-        if not each.name and not each.command:
+    for operation in added:
+        " ".join(operation.examples)
+        if not operation.name and not operation.command:
             return "an Operation has neither a verb nor a command"
-        if each.script is not None:
-            return f"{each.name}: features add no verbs of scripts"
-        for name, named in (each.name, _VERB), (each.command, _COMMAND):
+        if operation.script is not None:
+            return f"{operation.name}: features add no verbs of scripts"
+        for name, named in (operation.name, _VERB), (operation.command, _COMMAND):
             if name and not named.fullmatch(name):
                 return f"{name} is no name of a verb or a command"
-        if each.name and not each.extends and (each.name in VERBS.core_names or each.name in script_verbs()):
-            return f"{each.name} is taken"
-        if each.extends and each.name not in VERBS.core_names:
-            return f"multidrop has no verb {each.name} to extend"
-        if each.command and not each.meaning.strip():
-            return f"{each.command} has no meaning"
-        if each.do is not None and not callable(each.do):
-            return f"{each.verb or each.command} has no function"
-        if each.command and each.do is None and not COMMANDS.parts(each.command):
-            return f"{each.command} has no function"
-        LineParser(each.arguments)
-        each.add_to(ArgumentParser())
+        if (
+            operation.name
+            and not operation.extends
+            and (operation.name in VERBS.core_names or operation.name in script_verbs())
+        ):
+            return f"{operation.name} is taken"
+        if operation.extends and operation.name not in VERBS.core_names:
+            return f"multidrop has no verb {operation.name} to extend"
+        if operation.command and not operation.meaning.strip():
+            return f"{operation.command} has no meaning"
+        if operation.do is not None and not callable(operation.do):
+            return f"{operation.verb or operation.command} has no function"
+        if operation.command and operation.do is None and not COMMANDS.parts(operation.command):
+            return f"{operation.command} has no function"
+        LineParser(operation.arguments)
+        operation.add_to(ArgumentParser())
     for verb in _verbs(added).values():
         if not verb.help.strip():
             return f"{verb.name} has no help"
@@ -219,9 +228,9 @@ def join_others() -> None:
     """Load the features by others, and take out those that add what the core has, or what it cannot use."""
     registry.load_others()
     for feature in registry.by_others():
-        if not any(each is feature for each in _checked):
+        if not any(checked is feature for checked in _checked):
             why: list[str] = []
-            with registry.Attempt(why):
+            with registry.GuardedCall(why):
                 _check(feature)
             if why:
                 registry.refuse(feature.name, why[0])
@@ -237,8 +246,13 @@ def _check(feature: Feature) -> None:
     from multidrop.shell.connect.schemes import CORE
     from multidrop.shell.sections import CORE as TABLES
 
-    core = {*VERBS.core_names, *COMMANDS.core_names, *(f"{each}:" for each in CORE), *(f"[{each}]" for each in TABLES)}
-    if taken := next((each for each in registry.claims(feature) if each in core), ""):
+    core = {
+        *VERBS.core_names,
+        *COMMANDS.core_names,
+        *(f"{scheme}:" for scheme in CORE),
+        *(f"[{table}]" for table in TABLES),
+    }
+    if taken := next((claim for claim in registry.claims(feature) if claim in core), ""):
         raise Diagnostic(f"{taken} is taken")
     if wrong := _wrong([*registry.records((feature,), Operation)]):
         raise Diagnostic(wrong)
@@ -246,8 +260,8 @@ def _check(feature: Feature) -> None:
         if (added := getattr(record, "parameters", None)) is not None:  # more options of a command
             command = COMMANDS[record.command]  # type: ignore[attr-defined]
             command.add_to(ArgumentParser(), added)
-            names = {each.name for each in command.command_arguments}
-            if taken := next((each.name for each in added if each.name in names), ""):
+            names = {argument.name for argument in command.command_arguments}
+            if taken := next((operation.name for operation in added if operation.name in names), ""):
                 raise Diagnostic(f"{command.command}: the name {taken} is taken")
 
 

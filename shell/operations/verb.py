@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
 
 
-class Step(NamedTuple):
+class FormStep(NamedTuple):
     """The place of one word in a form: fixed words with their meanings, or an argument, or both."""
 
     words: Mapping[str, str]
@@ -39,7 +39,7 @@ class Step(NamedTuple):
 class Reached(NamedTuple):
     """How far typed words lead in a form."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[FormStep, ...]
     """Any of which may come next."""
     options: tuple[Parameter, ...]
     """Those that were not given."""
@@ -63,16 +63,16 @@ class Verb:
     @cached_property
     def main(self) -> Operation:
         """The operation that says what there is to say of the verb."""
-        return next((each for each in self.forms if each.help and not each.fixed), self.forms[0])
+        return next((form for form in self.forms if form.help and not form.fixed), self.forms[0])
 
     @cached_property
     def working(self) -> tuple[Operation, ...]:
         """The forms that do something."""
-        return tuple(each for each in self.forms if each.do is not None)
+        return tuple(form for form in self.forms if form.do is not None)
 
     def extended(self, added: Sequence[Operation]) -> Verb:
         """The verb with forms of features, which come first and take the place of its own ones."""
-        own = tuple(each for each in self.forms if all(each.verb != other.verb for other in added))
+        own = tuple(form for form in self.forms if all(form.verb != other.verb for other in added))
         return Verb((*added, *own))
 
     @property
@@ -106,7 +106,7 @@ class Verb:
 
     def usage_of(self, forms: Sequence[Operation]) -> str:
         """The usage with some of the forms alone. `[X]` is optional, `A|B` is one or the other."""
-        usages = list(dict.fromkeys(each.usage for each in forms))
+        usages = list(dict.fromkeys(form.usage for form in forms))
         text = " | ".join(filter(None, usages))
         return f"{self.name} [{text}]" if "" in usages and text else f"{self.name} {text}".strip()
 
@@ -118,13 +118,13 @@ class Verb:
     @cached_property
     def words(self) -> Mapping[str, str]:
         """The meanings of the fixed words and of the options."""
-        found: dict[str, str] = {}
+        meanings: dict[str, str] = {}
         for form in self.working:
-            found |= {word: form.help for word in form.fixed}
-            for each in form.arguments:
-                found |= {word: meaning for word, meaning in each.words.items() if meaning}
-                found |= {each.names[-1]: each.help} if each.option else {}
-        return found
+            meanings |= {word: form.help for word in form.fixed}
+            for argument in form.arguments:
+                meanings |= {word: meaning for word, meaning in argument.words.items() if meaning}
+                meanings |= {argument.names[-1]: argument.help} if argument.option else {}
+        return meanings
 
     def meaning_of(self, words: Sequence[str]) -> str:
         """The meaning of the first word if that is fixed; else the meaning of the verb."""
@@ -152,7 +152,7 @@ class Verb:
         Raises Diagnostic with the usage of the forms that can be meant, or with the name of a feature that is gone.
         """
         forms = self._meant(divided(rest)[0])
-        found: list[str] = []
+        filled: list[str] = []
         for form in forms:
             text, words = rest, list[str]()
             for _ in form.fixed:
@@ -163,12 +163,12 @@ class Verb:
             try:
                 return Chosen(form, form.parsed(text))
             except WrongWords as wrong:
-                found.append(str(wrong))
+                filled.append(str(wrong))
         for word in rest.split():
             if word.startswith("--"):
                 registry.with_word(f"{self.name} {word.partition('=')[0]}")
-        known = {f"no option {name}" for form in forms for each in form.options for name in each.names}
-        messages = (each for each in found if each and each not in known)
+        known = {f"no option {name}" for form in forms for option in form.options for name in option.names}
+        messages = (each for each in filled if each and each not in known)
         fixed = any(divided(rest)[0] in _first_words(form) for form in forms)
         raise self.wrong(next(messages, ""), forms if fixed else ())
 
@@ -179,8 +179,8 @@ class Verb:
 
     def _meant(self, word: str) -> Sequence[Operation]:
         """The forms that begin with a fixed word; else those that begin with any word, or have none."""
-        fixed = [each for each in self.working if word in _first_words(each)]
-        return fixed or [each for each in self.working if not _begins_with_fixed_word(each)]
+        fixed = [form for form in self.working if word in _first_words(form)]
+        return fixed or [form for form in self.working if not _begins_with_fixed_word(form)]
 
     # What is typed
 
@@ -188,11 +188,11 @@ class Verb:
         """What may follow these words: fixed words and options with their meanings, and arguments."""
         seen: set[str] = set()
         for _, reached in self._fitting(words):
-            for each in _offered(reached):
-                text = each.usage if isinstance(each, Parameter) else each[0]
+            for parameter in _offered(reached):
+                text = parameter.usage if isinstance(parameter, Parameter) else parameter[0]
                 if text not in seen:
                     seen.add(text)
-                    yield each
+                    yield parameter
 
     def narrowed(self, words: Sequence[str]) -> str:
         """The usage with only the forms that begin with these words (the last may be unfinished); else all of it."""
@@ -201,7 +201,7 @@ class Verb:
         *whole, last = words
         fitting = [form for form, reached in self._fitting(whole) if _begun(reached, last)]
         if not whole:
-            fitting = [each for each in fitting if last in _first_words(each)] or fitting
+            fitting = [form for form in fitting if last in _first_words(form)] or fitting
         return self.usage_of(fitting) if fitting else self.usage
 
     def _fitting(self, words: Sequence[str]) -> list[tuple[Operation, Reached]]:
@@ -210,9 +210,9 @@ class Verb:
         return [(form, at) for form in forms if (at := reached(form, words)) is not None]
 
 
-def _steps(form: Operation) -> list[Step]:
-    fixed = [Step({word: form.help}) for word in form.fixed]
-    return [*fixed, *(Step(each.words, each) for each in form.places)]
+def _steps(form: Operation) -> list[FormStep]:
+    fixed = [FormStep({word: form.help}) for word in form.fixed]
+    return [*fixed, *(FormStep(place.words, place) for place in form.places)]
 
 
 def _first_words(form: Operation) -> Iterable[str]:
@@ -235,31 +235,31 @@ def reached(form: Operation, words: Sequence[str]) -> Reached | None:
         if value_of is not None:
             value_of = None
         elif word.startswith("--"):
-            option = next((each for each in left if word in each.names), None)
+            option = next((parameter for parameter in left if word in parameter.names), None)
             if option is None:
                 return None
             left.remove(option)
             value_of = None if option.flag else option
         else:
-            here = {each for each in at if each < len(steps) and steps[each].takes(word)}
-            here = {each for each in here if word in steps[each].words} or here  # a fixed word takes precedence
-            at = _skipping(steps, {each + 1 for each in here} | {each for each in here if steps[each].repeats})
+            here = {index for index in at if index < len(steps) and steps[index].takes(word)}
+            here = {index for index in here if word in steps[index].words} or here  # a fixed word takes precedence
+            at = _skipping(steps, {index + 1 for index in here} | {index for index in here if steps[index].repeats})
             if not at:
                 return None
-    needed = max((number for number, each in enumerate(steps, 1) if not each.optional), default=0)
+    needed = max((number for number, step in enumerate(steps, 1) if not step.optional), default=0)
     options = tuple(left) if max(at) >= needed else ()
-    return Reached(tuple(steps[each] for each in sorted(at) if each < len(steps)), options, value_of)
+    return Reached(tuple(steps[index] for index in sorted(at) if index < len(steps)), options, value_of)
 
 
-def _skipping(steps: Sequence[Step], at: set[int]) -> set[int]:
+def _skipping(steps: Sequence[FormStep], at: set[int]) -> set[int]:
     """These places, and those that come after them where arguments are left out."""
-    found: set[int] = set()
-    for each in at:
-        found.add(each)
-        while each < len(steps) and steps[each].optional:
-            each += 1
-            found.add(each)
-    return found
+    skipped: set[int] = set()
+    for index in at:
+        skipped.add(index)
+        while index < len(steps) and steps[index].optional:
+            index += 1
+            skipped.add(index)
+    return skipped
 
 
 def _offered(at: Reached) -> Iterator[tuple[str, str] | Parameter]:
@@ -271,8 +271,8 @@ def _offered(at: Reached) -> Iterator[tuple[str, str] | Parameter]:
         yield from step.words.items()
         if step.argument is not None:
             yield step.argument
-    for each in at.options:
-        yield each.names[-1], each.help
+    for option in at.options:
+        yield option.names[-1], option.help
 
 
 def _begun(at: Reached, word: str) -> bool:
@@ -281,6 +281,6 @@ def _begun(at: Reached, word: str) -> bool:
         return True
     if any(each.startswith(word) for step in at.steps for each in step.words):
         return True
-    if any(name.startswith(word) for each in at.options for name in each.names):
+    if any(name.startswith(word) for option in at.options for name in option.names):
         return True
     return any(step.takes(word) for step in at.steps)

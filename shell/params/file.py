@@ -31,9 +31,9 @@ LISTED = 8
 async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
     """Read every setting of a drive. Raises DriveError; nothing is changed."""
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
-        found = await transferring(drive, drive.family.values.parameters.read(progress))
-    workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, found))
-    return found
+        readings = await transferring(drive, drive.family.values.parameters.read(progress))
+    workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, readings))
+    return readings
 
 
 def listed(names: Sequence[str]) -> str:
@@ -78,13 +78,13 @@ def formatted(drive: Mapping[str, str], found: Readings) -> str:
     document[DRIVE] = dict(drive)
     for section in SECTIONS:
         table = tomlkit.table()
-        for each in found.readings:
-            if each.section == section:
-                item = tomlkit.item(list(each.value) if isinstance(each.value, tuple) else each.value)
-                default = "" if each.default is None else f"default {shown(each.default)}"
-                if remark := ", ".join(filter(None, (each.unit, default))):
+        for reading in found.readings:
+            if reading.section == section:
+                item = tomlkit.item(list(reading.value) if isinstance(reading.value, tuple) else reading.value)
+                default = "" if reading.default is None else f"default {shown(reading.default)}"
+                if remark := ", ".join(filter(None, (reading.unit, default))):
                     item.comment(remark)
-                table.add(each.name, item)
+                table.add(reading.name, item)
         document[section] = table
     if found.unread:
         document[UNREAD] = dict(found.unread)
@@ -123,20 +123,20 @@ def load(path: str | Path) -> SettingsFile:
 
 
 def _table(tables: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
-    found = tables.get(name, {})
-    if not isinstance(found, dict):
+    table = tables.get(name, {})
+    if not isinstance(table, dict):
         raise Diagnostic(f"{name} must be a table", where, f"write [{name}]")
-    return found
+    return table
 
 
 def _value(value: Any, where: str) -> Value:
     several = isinstance(value, list) and bool(value)
-    for each in value if several else (value,):
-        whole = isinstance(each, int) and not isinstance(each, bool) and each in _TOML_INTEGERS
-        if not (whole or isinstance(each, float | str)):
+    for part in value if several else (value,):
+        whole = isinstance(part, int) and not isinstance(part, bool) and part in _TOML_INTEGERS
+        if not (whole or isinstance(part, float | str)):
             raise Diagnostic("must be a number, a text, or a list of them", where)
-    found: Value = tuple(value) if several else value
-    return found
+    setting: Value = tuple(value) if several else value
+    return setting
 
 
 def _list(names: tuple[str, ...]) -> str:

@@ -46,13 +46,13 @@ def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False
     bus, _, own = name.rpartition(":")
     placed = [(each.name, spec) for each in cell.buses for spec in each.drives]
     own = own or drive.address or drive.state.name
-    found = [spec for place, spec in placed if spec.name == own and bus in ("", place)]
+    specs = [spec for place, spec in placed if spec.name == own and bus in ("", place)]
     if not name and len(placed) == 1 and not several:
-        found = [placed[0][1]]
-    if len(found) == 1:
-        return found[0]
+        specs = [placed[0][1]]
+    if len(specs) == 1:
+        return specs[0]
     names = ", ".join(f"{place}:{spec.name}" for place, spec in placed)
-    what = f'no drive "{name or own}"' if not found else f'"{own}" is the name of several drives'
+    what = f'no drive "{name or own}"' if not specs else f'"{own}" is the name of several drives'
     hint = f"the file has {names}; --drive names one drive" if several else f"--from names one of {names}"
     raise Diagnostic(what, file, hint)
 
@@ -133,8 +133,8 @@ class _Replacement:
         if here.personality != spec.personality and not self._wanted.other_product:
             raise Diagnostic(what, self._name, "--other-product applies it all the same")
         bus = self._session.buses[self._drive.link.name]
-        others = [each for each in bus.drives.values() if each is not self._drive]
-        if any(spec.name in (each.address, each.state.name) for each in others):
+        others = [drive for drive in bus.drives.values() if drive is not self._drive]
+        if any(spec.name in (drive.address, drive.state.name) for drive in others):
             raise Diagnostic(f"another drive on {bus.name} is named {spec.name!r}; nothing was sent", self._name)
         if others and here.party and not spec.party:
             what = f"{spec.name!r} in {self._file} is not in party mode, and {bus.name} has other drives"
@@ -164,11 +164,11 @@ class _Replacement:
         elif now.program and not self._program.lines:
             out(f"{self._name}: its program of {counted(len(now.program), 'line')} stays: {self._file} has none")
         ordinary, whole = self._plans(now)
-        final = {each.name: each for each in whole if not each.temporary}
-        wire = [name for name in final if name not in {each.name for each in ordinary}]
-        for name, each in final.items():
-            before = "" if each.before is None else f" (was {shown(each.before)})"
-            out(f"{self._name}: {each.text}{before}{', at the end' if name in wire else ''}")
+        final = {change.name: change for change in whole if not change.temporary}
+        wire = [name for name in final if name not in {change.name for change in ordinary}]
+        for name, change in final.items():
+            before = "" if change.before is None else f" (was {shown(change.before)})"
+            out(f"{self._name}: {change.text}{before}{', at the end' if name in wire else ''}")
         if count := len(final) - len(wire):
             changes.append(counted(count, "setting"))
         if wire:
@@ -197,7 +197,7 @@ class _Replacement:
 
     def _steps(self, now: Snapshot) -> tuple[object, ...]:
         """What an apply changes in a drive: what the question is about."""
-        return (now.program, *(tuple((each.text, each.before) for each in plan) for plan in self._plans(now)))
+        return (now.program, *(tuple((change.text, change.before) for change in plan) for plan in self._plans(now)))
 
     def _differs(self, here: DriveSpec) -> bool:
         program = self._program.lines
@@ -244,8 +244,10 @@ class _Replacement:
     def _verify(self, here: DriveSpec) -> None:
         """Compare what was read last with the file. Raises DriveError where it is not the same."""
         values = _tables(here).wanted(here)
-        found = [each for each in differing(values, self._settings) if each[0] in self._settings]
-        wrong = [f"{name} {shown(mine)}, in the file {shown(value)}" for name, mine, value in found]
+        differences = [
+            difference for difference in differing(values, self._settings) if difference[0] in self._settings
+        ]
+        wrong = [f"{name} {shown(mine)}, in the file {shown(value)}" for name, mine, value in differences]
         if self._differs(here):
             wrong.append("its program")
         if wrong:

@@ -56,21 +56,21 @@ def targets(workspace: Workspace, origin: Origin, target: str, having: str = "pa
 
     Raises Diagnostic for an unknown one.
     """
-    found: dict[Drive, None] = {}
+    chosen: dict[Drive, None] = {}
     for name in target.split(","):
         bus, address = origin.target(name)
         if address not in ALL:
-            found[workspace.drive(bus, address or None)] = None
+            chosen[workspace.drive(bus, address or None)] = None
             continue
         buses = [workspace.bus(bus)] if bus else list(workspace.buses.values())
         drives = [drive for each in buses for drive in each.drives.values()]
         able = [drive for drive in drives if having != "programs" or drive.family.programs is not None]
         if not able:
             raise Diagnostic(f"no drive with {having} has replied", target)
-        found |= dict.fromkeys(able)
+        chosen |= dict.fromkeys(able)
         if len(drives) == 1 and drives[0].address:  # perhaps only the last session's choice
             workspace.notify(f"{target} is {drives[0].address} alone; {OTHERS}", bus=drives[0].link.name, outcome=True)
-    return list(found)
+    return list(chosen)
 
 
 def is_several(target: str) -> bool:
@@ -124,7 +124,7 @@ async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> Non
         rest = "; the others are done" if len(failed) < len(drives) else ""
         text = f"{len(failed)} of {len(drives)} drives failed: {', '.join(failed)}{rest}"
         for kind in (TransportLost, DriveError):  # of the gravest kind: no connection, then a drive, then a file
-            if any(isinstance(each, kind) for each in failed.values()):
+            if any(isinstance(loss, kind) for loss in failed.values()):
                 raise kind(text)
         raise Diagnostic(text)
 
@@ -141,11 +141,11 @@ async def backup(workspace: Workspace, origin: Origin, name: str, target: str) -
         own = file_of(workspace, drive, name, target)
         make_place(own, target)
         new_file.check(own, printed=True)
-        found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
-        new_file.write(own, backup_text(drive, found), partial(workspace.output, origin=origin))
-        workspace.notify(f"{who}: {counted(len(found.readings), 'setting')}{new_file.place(own)}")
-        if found.unread:
-            names = files.listed([name for name, _ in found.unread])
+        readings, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
+        new_file.write(own, backup_text(drive, readings), partial(workspace.output, origin=origin))
+        workspace.notify(f"{who}: {counted(len(readings.readings), 'setting')}{new_file.place(own)}")
+        if readings.unread:
+            names = files.listed([name for name, _ in readings.unread])
             workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)
 
     await each(workspace, targets(workspace, origin, target), keep)
@@ -155,8 +155,8 @@ async def read(workspace: Workspace, origin: Origin, target: str) -> None:
     """Read the settings of drives, and say how many there are; screens show them."""
 
     async def count(drive: Drive) -> None:
-        found = await files.read(workspace, drive, "reading")
-        workspace.notify(f"{workspace.display_name(drive)}: {counted(len(found.readings), 'setting')} read")
+        readings = await files.read(workspace, drive, "reading")
+        workspace.notify(f"{workspace.display_name(drive)}: {counted(len(readings.readings), 'setting')} read")
 
     await each(workspace, targets(workspace, origin, target), count)
 
@@ -201,12 +201,12 @@ async def diff(
             raise Diagnostic(f"has settings of {file.product or 'a drive'} in {file.language}, and {has}", file.path)
         if other is not None and (theirs := other.family.values.parameters.language) != language:
             raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {has}")
-        found, who = await files.read(workspace, drive, "reading"), workspace.display_name(drive)
-        if file is not None and (aside := [name for name, _ in found.unread if name in file.named]):
+        readings, who = await files.read(workspace, drive, "reading"), workspace.display_name(drive)
+        if file is not None and (aside := [name for name, _ in readings.unread if name in file.named]):
             workspace.notify(f"{who}: not read, so not compared: {files.listed(aside)}", warning=True)
-        rows = differences(found, file if reference is None else reference, who)
+        rows = differences(readings, file if reference is None else reference, who)
         differs = differs or bool(rows)
-        units = {each.name: each.unit for each in found.readings}
+        units = {reading.name: reading.unit for reading in readings.readings}
         for setting, here, there in rows:
             if as_json:
                 own = {"drive": who} if several else {}
@@ -230,7 +230,7 @@ def differences(found: Readings, other: files.SettingsFile | Readings | None, wh
     there: Mapping[str, Value]
     if other is None:
         there, names = found.defaults, [*found.defaults]
-        if not any(each.default is not None for each in found.readings if each.section != VARIABLES):
+        if not any(reading.default is not None for reading in found.readings if reading.section != VARIABLES):
             raise Diagnostic(f"{who}: the defaults of its settings are not known", hint="compare with a file")
     elif isinstance(other, Readings):
         there = other.values
@@ -239,9 +239,11 @@ def differences(found: Readings, other: files.SettingsFile | Readings | None, wh
         there, unread = other.named, {name for name, _ in found.unread}
         names = [name for name in there if name not in unread]
         if other.has_variables:
-            names += [each.name for each in found.readings if each.section == VARIABLES and each.name not in there]
+            names += [
+                reading.name for reading in found.readings if reading.section == VARIABLES and reading.name not in there
+            ]
     rows = [(name, found.values.get(name), there.get(name)) for name in names]
-    return [each for each in rows if not same(each[1], each[2])]
+    return [row for row in rows if not same(row[1], row[2])]
 
 
 # Restore
@@ -399,7 +401,7 @@ def _accounted(workspace: Workspace, who: str, plan: Plan) -> Iterator[list[Chan
         if done == len(plan):
             account = "all steps are done; reading back or saving was cut off; restore again to make sure"
         else:
-            temporary = [f"{each.name}={files.shown(each.after)}" for each in last.values() if each.temporary]
+            temporary = [f"{change.name}={files.shown(change.after)}" for change in last.values() if change.temporary]
             held_for_now = f"; for a while it has {', '.join(temporary)}" if temporary else ""
             names = f": {', '.join(last)}" if last else ""
             more = f"; {plan.changes[done].text} may be done{held_for_now}; nothing was saved; restore again"

@@ -13,7 +13,7 @@ TWIN = "twin"
 """The part of a path before the quantities of a twin; also its lane of states."""
 
 
-class Curve(NamedTuple):
+class PlottedCurve(NamedTuple):
     """One curve: `axis` is empty for a drive with one axis, `word` is `position`, `velocity` or a word of the drive.
 
     `twin`: of its twin.
@@ -45,7 +45,7 @@ class Curve(NamedTuple):
         return tuple(part for part in self[:3] if part)
 
 
-class State(NamedTuple):
+class StateLane(NamedTuple):
     """One lane of states: a program, an error, an input or an output."""
 
     bus: str
@@ -58,11 +58,11 @@ class State(NamedTuple):
 class Batch:
     """The samples and texts since the last flush; times are (elapsed, s; wall clock, s since 1970)."""
 
-    curves: dict[Curve, list[tuple[float, float, float]]] = field(default_factory=dict)
+    curves: dict[PlottedCurve, list[tuple[float, float, float]]] = field(default_factory=dict)
     texts: dict[str, list[tuple[float, float, str, str]]] = field(default_factory=dict)
-    gaps: dict[Curve, list[tuple[float, float]]] = field(default_factory=dict)
+    gaps: dict[PlottedCurve, list[tuple[float, float]]] = field(default_factory=dict)
     """Times at which a curve ends; the next sample begins it again."""
-    states: dict[State, list[tuple[float, float, str]]] = field(default_factory=dict)
+    states: dict[StateLane, list[tuple[float, float, str]]] = field(default_factory=dict)
     """Changes of state; an empty one is not known."""
     labels: dict[tuple[str, str], str] = field(default_factory=dict)
     """Drives that begin to be plotted, in order, with the names that people gave to them."""

@@ -29,7 +29,7 @@ def lost(workspace: Session) -> TransportLost | None:
     return next((bus.lost for bus in workspace.buses.values() if bus.lost and bus.name not in trying), None)
 
 
-class Polling(NamedTuple):
+class PollOptions(NamedTuple):
     """What a person asks for."""
 
     names: Sequence[str]
@@ -41,12 +41,12 @@ class Polling(NamedTuple):
     json: bool
 
 
-def poll(url: str, asked: Polling, reconnect: bool) -> int:
+def poll(url: str, asked: PollOptions, reconnect: bool) -> int:
     """Poll until a signal, which ends it well, or for a number of rows; return the exit code."""
     return runner.run([url], lambda session: _poll(session, asked), interrupted=0, reconnect=reconnect, replies=False)
 
 
-async def _poll(session: Session, asked: Polling) -> None:
+async def _poll(session: Session, asked: PollOptions) -> None:
     wanted = _wanted(session, asked)
     for drive, word in wanted:
         await drive.run(drive.family.values.first(word), typed=True)
@@ -55,11 +55,13 @@ async def _poll(session: Session, asked: Polling) -> None:
         write(sys.stdout, f"{'time':<{STAMP}}" + "".join(f"  {name:>{WIDTH}}" for name in columns))
     due = session.now()
     for row in count(1):
-        values = [await _value(session, *each) for each in wanted]
+        values = [await _value(session, *value_of) for value_of in wanted]
         now = session.wall(session.now()).astimezone(UTC)
         stamp = now.isoformat(timespec="milliseconds").replace("+00:00", "Z")
         if asked.json:
-            write(sys.stdout, *(_object(stamp, *each, value) for each, value in zip(wanted, values, strict=True)))
+            write(
+                sys.stdout, *(_object(stamp, *value_of, value) for value_of, value in zip(wanted, values, strict=True))
+            )
         else:
             shown = ["-" if value is None else f"{value:.10g}" for value in values]
             cells = (f"  {text:>{max(WIDTH, len(name))}}" for text, name in zip(shown, columns, strict=True))
@@ -70,17 +72,17 @@ async def _poll(session: Session, asked: Polling) -> None:
         await asyncio.sleep(due - session.now())
 
 
-def _wanted(session: Session, asked: Polling) -> list[tuple[Drive, str]]:
+def _wanted(session: Session, asked: PollOptions) -> list[tuple[Drive, str]]:
     """Each value: a word of each drive, or of the one that precedes its dot. Raises Diagnostic; sends nothing."""
-    found: dict[tuple[Drive, str], None] = {}
+    wanted: dict[tuple[Drive, str], None] = {}
     drives = targets(session, session.origin, asked.drives, "values")
     for name in asked.names:
         target, _, word = name.rpartition(".")
         if not word:
             raise Diagnostic(f"no value in {name!r}", hint="valid: NAME or ADDR.NAME, as P, b.VM, press:b.I1")
         for drive in targets(session, session.origin, target, "values") if target else drives:
-            found[drive, drive.family.values.check(word)] = None
-    return list(found)
+            wanted[drive, drive.family.values.check(word)] = None
+    return list(wanted)
 
 
 async def _value(session: Session, drive: Drive, word: str) -> float | None:

@@ -18,12 +18,12 @@ FORMS = "valid: ADDR, ADDR.VALUE or VALUE, with BUS: before ADDR if it is on ano
 
 def parse_series(workspace: Session, texts: Sequence[str]) -> tuple[Series, ...]:
     """Return the series of these texts; without a text, all drives of all buses. Sends nothing. Raises Diagnostic."""
-    found: dict[Series, None] = {}
+    series: dict[Series, None] = {}
     for text in texts:
-        found |= dict.fromkeys(_parse(workspace, text))
+        series |= dict.fromkeys(_parse(workspace, text))
     if not texts:
-        found = {Series(bus.name, each): None for bus in workspace.buses.values() for each in bus.drives}
-    return tuple(found)
+        series = {Series(bus.name, drive): None for bus in workspace.buses.values() for drive in bus.drives}
+    return tuple(series)
 
 
 def _parse(workspace: Session, text: str) -> list[Series]:
@@ -41,13 +41,13 @@ def _parse(workspace: Session, text: str) -> list[Series]:
         drives = _drives(workspace, target)
         if not drives:
             raise Diagnostic(f"no drive {target}", hint=_valid(workspace, target))
-    found = [_value(workspace, bus, address, word, text) for bus, address in drives]
-    if not dot and found[0].word != DIFFERENCE:
-        drive = workspace.buses[found[0].bus].drives[found[0].address]
-        if not drive.family.values.own(found[0].word):  # a name that a person gave
+    values = [_value(workspace, bus, address, word, text) for bus, address in drives]
+    if not dot and values[0].word != DIFFERENCE:
+        drive = workspace.buses[values[0].bus].drives[values[0].address]
+        if not drive.family.values.own(values[0].word):  # a name that a person gave
             hint = f"{_valid(workspace, text)}; .{text} is a user's variable"
             raise Diagnostic(f"no drive and no value {text}", hint=hint)
-    return found
+    return values
 
 
 def _drives(workspace: Session, target: str) -> list[tuple[str, str]]:
@@ -57,10 +57,10 @@ def _drives(workspace: Session, target: str) -> list[tuple[str, str]]:
     if bus is None:
         return []
     if address in EVERYONE:
-        return [(bus.name, each) for each in bus.drives]
+        return [(bus.name, drive) for drive in bus.drives]
     named = (drive.address for drive in bus.drives.values() if address and drive.label == address)
-    found = address if address in bus.drives else next(named, None)
-    return [] if found is None else [(bus.name, found)]
+    known_address = address if address in bus.drives else next(named, None)
+    return [] if known_address is None else [(bus.name, known_address)]
 
 
 def _valid(workspace: Session, target: str) -> str:
@@ -78,8 +78,8 @@ def _value(workspace: Session, bus: str, address: str, word: str, text: str) -> 
     if word.lower() == DIFFERENCE:
         if workspace.buses[bus] in workspace.predicted:
             return Series(bus, address, DIFFERENCE)
-        for each in registry.added(Predicting):
-            raise Diagnostic(f"{drive.shown}: {each.missing}", hint=each.begin)
+        for predicting in registry.added(Predicting):
+            raise Diagnostic(f"{drive.shown}: {predicting.missing}", hint=predicting.begin)
     return Series(bus, address, drive.family.values.check(word))
 
 

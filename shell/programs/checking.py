@@ -23,9 +23,9 @@ from multidrop.simulator.families import PROGRAMS
 if TYPE_CHECKING:
     pass
 
-USUAL = DriveSpec().personality
+USUAL_PERSONALITY = DriveSpec().personality
 """The product for which programs are checked unless another one is named."""
-LONGEST = 65536
+LONGEST_GUESSED_TEXT = 65536
 """Characters of a text that may be in another language; more than fit into any drive."""
 
 
@@ -71,9 +71,9 @@ def examine_text(text: str, file: str, personality: str, language: str = "", enc
     named, language = language, language or program_language_of(file)
     source = program_languages()[language].language
     problems = source.check(text, personality)
-    if not named and len(text) <= LONGEST:
+    if not named and len(text) <= LONGEST_GUESSED_TEXT:
         lines = sum(bool(line.strip()) for line in split_lines(text))
-        mostly_wrong = 3 * len({each.line for each in errors(problems)}) >= lines > 0
+        mostly_wrong = 3 * len({error.line for error in errors(problems)}) >= lines > 0
         if mostly_wrong and (other := _other_language(text, language)) is not None:
             return Checked(file, [other])
     more = PROGRAMS[language].refusals(text, file, personality, problems)  # what a simulated drive refuses besides
@@ -86,7 +86,7 @@ def examine_text(text: str, file: str, personality: str, language: str = "", enc
 def personality_of(language: str, product: str) -> str:
     """Return the product if its drives run programs of that language, else the usual one of those that do."""
     known = simulated()[language].personalities
-    return product if product in known else USUAL if USUAL in known else known[0]
+    return product if product in known else USUAL_PERSONALITY if USUAL_PERSONALITY in known else known[0]
 
 
 def ending_of(product: str) -> str:

@@ -19,14 +19,14 @@ from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost, Restarted
 from multidrop.shell.events import OnBus, Phase, SessionEvent
 from multidrop.shell.origin import Origin
-from multidrop.shell.program_listing import Listing, Sight
+from multidrop.shell.program_listing import ListingSight, ProgramListing
 from multidrop.shell.session import Session
 
-PERIOD = 0.1
+READ_PERIOD = 0.1
 """The time between two looks at a running program, s."""
 LONG_QUIET = 5.0
 """The time without a traced line after which a message says so, s."""
-QUIET = 0.5
+BREAK_QUIET = 0.5
 """The time without a traced line after which a break point may be the reason, s."""
 LONGEST_HOLD = 65.0
 """The longest time of an H, which counts where its time is not known, s."""
@@ -45,7 +45,7 @@ class Debugger:
 
     def __init__(self, session: Session, drive: Drive) -> None:
         self._session, self._drive = session, drive
-        self._listing = Listing(session.settings.state, drive.programs)
+        self._listing = ProgramListing(session.settings.state, drive.programs)
         self._commands = -1
         """The commands to the drive when the listing was read, ours included: after another one it is read again."""
         self._stops = drive.link.stops
@@ -62,21 +62,21 @@ class Debugger:
         self._watched: tuple[str, ...] = ()
         self._values: Mapping[str, str] = {}
         """The last values of the watched names; a name without one is not there."""
-        self._sight = Sight(session, drive)
+        self._sight = ListingSight(session, drive)
         self._checks: set[asyncio.Task[None]] = set()
         self._unsubscribe = session.subscribe(self._notice)
 
     @property
     def _debugging(self) -> Debugging:
-        found = self._drive.family.debugging
-        assert found is not None
-        return found
+        debugging = self._drive.family.debugging
+        assert debugging is not None
+        return debugging
 
     # Starting
 
     async def trace(self, origin: Origin, place: str) -> None:
         """Run a program, and show its lines until it ends or comes to its break point."""
-        others = [each.address for each in self._session.bus(self._drive.link.name).all_drives]
+        others = [drive.address for drive in self._session.bus(self._drive.link.name).all_drives]
         annotators = self._session.of(self._session.buses[self._drive.link.name]).annotators
         annotators.append(self._annotated)
         try:
@@ -148,7 +148,7 @@ class Debugger:
 
     async def _follow(self, origin: Origin) -> None:
         while True:
-            await asyncio.sleep(PERIOD)
+            await asyncio.sleep(READ_PERIOD)
             look = await self._look()
             if look.address is not None and (row := self._listing.row(look.address)) != self._last:
                 self._session.output(self._listing.shown(row), origin=origin)
@@ -159,20 +159,20 @@ class Debugger:
             if look.paused:
                 return await self._show_waiting(origin, look.address)
             quiet = self._session.now() - max(self._last_at, self._free_at)
-            if not self.break_point or self._last is None or quiet < QUIET:
+            if not self.break_point or self._last is None or quiet < BREAK_QUIET:
                 continue  # a quiet trace without a hold may wait at its break point
             procedure = self._debugging.broken(self._listing.rows, self._last, self.break_point)
             address: int | None = await self._run(procedure)
             if address is not None:
                 return await self._show_waiting(origin, address)
-            if LONG_QUIET <= quiet < LONG_QUIET + 2 * PERIOD:
+            if LONG_QUIET <= quiet < LONG_QUIET + 2 * READ_PERIOD:
                 where = f"it holds, or waits at {self.break_point}"
                 self.say(f"no line since '{self._last.text}': {where}; /break now makes sure")
 
     async def _look(self) -> Look:
         look: Look = await self._run(self._debugging.look(self._place))
         if not look.runs:
-            await asyncio.sleep(PERIOD)  # its last lines may still be on the wire
+            await asyncio.sleep(READ_PERIOD)  # its last lines may still be on the wire
             self._place, self._waits = "", False
             self._sight.seen(None)
         return look
@@ -251,7 +251,7 @@ class Debugger:
         """Read the program of the drive, unless only we have commanded it since."""
         if self._commands != self._drive.commands:
             rows = await self._drive.run(self._debugging.listing())
-            self._listing = Listing(self._session.settings.state, self._drive.programs, rows)
+            self._listing = ProgramListing(self._session.settings.state, self._drive.programs, rows)
             self._commands = self._drive.commands
             self._sight.read(self._listing)
 
@@ -333,9 +333,9 @@ class Debugger:
 def of(session: Session, drive: Drive) -> Debugger:
     """Find the debugger of a drive, or make it. Raises Inexpressible where its family has none."""
     debuggers = session.of(session.buses[drive.link.name]).debuggers
-    found = debuggers.get(drive)
-    if isinstance(found, Debugger):
-        return found
+    debugger = debuggers.get(drive)
+    if isinstance(debugger, Debugger):
+        return debugger
     if drive.family.debugging is None:
         raise Inexpressible(f"{session.display_name(drive)}: programs of its family cannot be observed")
     made = debuggers[drive] = Debugger(session, drive)

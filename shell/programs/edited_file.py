@@ -16,7 +16,7 @@ from multidrop.base.files import bytes_of, decoded, why
 from multidrop.base.store import digest
 from multidrop.base.text import ACTING
 
-LARGEST = 512 * 1024
+LARGEST_FILE = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""
 _ACT = [code for low, high in ACTING if low != 0xD800 for code in range(low, high + 1) if chr(code) not in "\n\t"]
 _STAND_IN_OF = {code: chr(0xF700 + number) for number, code in enumerate(_ACT)}
@@ -165,8 +165,8 @@ def _content(path: Path) -> bytes | None:
     if not path.is_file():
         raise Diagnostic("is not a regular file", str(path), "name a text file")
     data = bytes_of(path)
-    if len(data) > LARGEST:
-        raise Diagnostic(f"is larger than {LARGEST // 1024} KB", str(path), "no drive holds such a program")
+    if len(data) > LARGEST_FILE:
+        raise Diagnostic(f"is larger than {LARGEST_FILE // 1024} KB", str(path), "no drive holds such a program")
     if b"\0" in data:
         raise Diagnostic("is not a text file", str(path), "a program is plain text")
     return data

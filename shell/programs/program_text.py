@@ -15,7 +15,7 @@ from multidrop.base.files import split_lines
 from multidrop.base.text import counted
 from multidrop.dialects.editing import Block, Offer, Span, UserName
 from multidrop.dialects.families import program_language_of, program_languages
-from multidrop.dialects.program_files import Entry, Part, Problem, errors
+from multidrop.dialects.program_files import LinePart, Problem, ProgramEntry, errors
 
 BYTE_ORDER_MARK = "\ufeff"
 
@@ -31,7 +31,7 @@ class ProgramGrammar:
         self.files = program_languages()[self.language]
         self.title = self.files.title
 
-    def parts(self, line: str) -> Sequence[Part]:
+    def parts(self, line: str) -> Sequence[LinePart]:
         return self.files.language.parts(line)
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
@@ -43,7 +43,7 @@ class ProgramGrammar:
             return ()
         return examine_text(text, self._file, personality_of(self.language, product), self._named).problems
 
-    def entries(self, text: str) -> Sequence[Entry]:
+    def entries(self, text: str) -> Sequence[ProgramEntry]:
         return self.files.language.entries(text)
 
 
@@ -55,7 +55,7 @@ class Help(NamedTuple):
 
 
 class Coloured(NamedTuple):
-    """A part of a line with its kind: that of a `Part`, or of a `UserName`. `declares`: it declares its name."""
+    """A part of a line with its kind: that of a `LinePart`, or of a `UserName`. `declares`: it declares its name."""
 
     place: Span
     kind: str
@@ -70,7 +70,7 @@ class Fold(NamedTuple):
     remarks: bool = False
 
 
-class Edit(NamedTuple):
+class TextEdit(NamedTuple):
     """Another text at a place."""
 
     place: Span
@@ -105,11 +105,11 @@ class ProgramText:
     @cached_property
     def _places(self) -> Mapping[int, list[tuple[Span, UserName]]]:
         """The places of names, by line."""
-        found: dict[int, list[tuple[Span, UserName]]] = {}
+        places: dict[int, list[tuple[Span, UserName]]] = {}
         for name in self.names:
             for place in name.places:
-                found.setdefault(place.line, []).append((place, name))
-        return {line: sorted(places, key=lambda each: each[0]) for line, places in found.items()}
+                places.setdefault(place.line, []).append((place, name))
+        return {line: sorted(places, key=lambda each: each[0]) for line, places in places.items()}
 
     def line(self, number: int) -> str:
         """Return a line; an empty one beyond the text."""
@@ -124,21 +124,21 @@ class ProgramText:
 
     def help_at(self, line: int, column: int) -> Help | None:
         """Return the help on the word at a place, or that ends there: the name of the user's, or the drive's word."""
-        found = self.name_at(line, column)
+        named = self.name_at(line, column)
         own = frozenset(name.word for name in self.names)
-        words = [each for each in self._language.words(self.line(line), own) if each.start <= column]
-        word = next((each for each in reversed(words) if column <= each.stop), None)
-        lines = self._described(found[0]) if found is not None else []
+        words = [part for part in self._language.words(self.line(line), own) if part.start <= column]
+        word = next((part for part in reversed(words) if column <= part.stop), None)
+        lines = self._described(named[0]) if named is not None else []
         if word is not None:
             lines += self._language.describe(word.text, self._product)
         if not lines:
             return None
-        place = found[1] if found is not None else Span(line, word.start, word.stop) if word is not None else None
+        place = named[1] if named is not None else Span(line, word.start, word.stop) if word is not None else None
         return Help(place, tuple(lines)) if place is not None else None
 
     def described(self, word: str) -> Sequence[str]:
         """Return the help on a name or a word of the language; empty where there is none."""
-        name = next((each for each in self.names if each.word == word), None)
+        name = next((user_name for user_name in self.names if user_name.word == word), None)
         return self._described(name) if name is not None else self._language.describe(word, self._product)
 
     def _described(self, name: UserName) -> list[str]:
@@ -155,18 +155,18 @@ class ProgramText:
 
     def renamable_at(self, line: int, column: int) -> tuple[UserName, Span]:
         """Return the name at a place. Raises Diagnostic where there is none, or it cannot be another one."""
-        found = self.name_at(line, column)
-        if found is None:
+        named = self.name_at(line, column)
+        if named is None:
             raise Diagnostic("only a label, a variable or a subroutine of this file has a name to change")
-        if reason := self._language.fixed(found[0]):
+        if reason := self._language.fixed(named[0]):
             raise Diagnostic(reason)
-        return found
+        return named
 
-    def renamed_at(self, line: int, column: int, new: str) -> list[Edit]:
+    def renamed_at(self, line: int, column: int, new: str) -> list[TextEdit]:
         """Return the edits that rename the name at a place. Raises Diagnostic where the new name is wrong."""
         name, _ = self.renamable_at(line, column)
         text = self._language.renamed(self.text, name, new, self._product)
-        return [Edit(place, text) for place in name.places]
+        return [TextEdit(place, text) for place in name.places]
 
     # All of it
 
@@ -179,7 +179,7 @@ class ProgramText:
                 for part in self.grammar.parts(self.lines[number])
                 if not any(place.start < part.stop and part.start < place.stop for place, _, _ in names)
             ]
-            yield from (Coloured(*each) for each in sorted([*names, *parts]))
+            yield from (Coloured(*name) for name in sorted([*names, *parts]))
 
     def folds(self) -> Iterator[Fold]:
         """Yield what may be folded: blocks, and remarks in lines of their own."""
@@ -199,7 +199,7 @@ class ProgramText:
                     yield Fold(first, number - 1, remarks=True)
                 first = None
 
-    def formatted(self, first: int, last: int) -> list[Edit]:
+    def formatted(self, first: int, last: int) -> list[TextEdit]:
         """Return the edits that give lines their canonical spelling. Raises Diagnostic for a text with errors."""
         if wrong := errors(self.problems):
             count = f"{len(wrong)} errors, the first" if len(wrong) > 1 else "an error"
@@ -209,5 +209,5 @@ class ProgramText:
             if old != new and first <= number <= last:  # without what both spellings begin and end with
                 start = len(commonprefix((old, new)))
                 end = min(len(commonprefix((old[::-1], new[::-1]))), min(len(old), len(new)) - start)
-                edits.append(Edit(Span(number, start, len(old) - end), new[start : len(new) - end]))
+                edits.append(TextEdit(Span(number, start, len(old) - end), new[start : len(new) - end]))
         return edits

@@ -25,20 +25,20 @@ from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.operations.argument_types import Downloading
 from multidrop.shell.origin import Origin
-from multidrop.shell.program_listing import Sight, check_one, read
+from multidrop.shell.program_listing import ListingSight, check_one, read
 from multidrop.shell.session import Session
 from multidrop.shell.state.backups import Copy, Sources, write_backup
 from multidrop.shell.state.crash_marks import marked
 from multidrop.shell.workspace import Workspace
 
 PLAIN = Downloading()
-LIMIT = 10.0
+END_TIMEOUT = 10.0
 """The longest wait for a running program and its motion to end, s."""
-APART = 0.05
+END_PERIOD = 0.05
 """The time between two looks at it, s."""
 _under_way: WeakSet[Drive] = WeakSet()
 """The drives to which a file is being downloaded."""
-MOST = 20
+MOST_LISTED_LINES = 20
 """The largest number of differing lines that are shown."""
 
 
@@ -63,9 +63,9 @@ async def checked(
         raise Diagnostic(f"is {title}, and {workspace.display_name(drive)} runs {own.title}", file)
     refuse(problems, file)
     unit = await asyncio.to_thread(own.unsupported, text, drive.product, drive.version, drive.state.part)
-    for each in in_order([*problems, *unit]):
-        if each.warning:
-            workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
+    for problem in in_order([*problems, *unit]):
+        if problem.warning:
+            workspace.notify(f"{problem.where(file)}: warning: {problem.what}", warning=True)
     return text, await asyncio.to_thread(own.language.read, text, file)
 
 
@@ -194,14 +194,14 @@ class _Download:
     async def agree(self, lines: Sequence[SourceLine], by: By) -> None:
         """Ask before lines outside of a program that act: the drive executes them at once. Raises Diagnostic."""
         guards, drive = self._session.settings.guards, self._drive
-        found = []
+        problems = []
         for line in self._outside(lines):
             what = guards.what(drive.family, line.text)
             if what or self._programs.acts(line.text):
-                found.append(f"line {line.number}: " + (what or f"'{line.text}' starts motion or a program"))
-        if not found:
+                problems.append(f"line {line.number}: " + (what or f"'{line.text}' starts motion or a program"))
+        if not problems:
             return
-        what = f"{self._file}, outside of its program, {'; '.join(found)}"
+        what = f"{self._file}, outside of its program, {'; '.join(problems)}"
         if self._session.questions.agreed:
             self._say(what, warning=True)
         await self._session.questions.confirm(what, self._name, by=by)
@@ -220,7 +220,7 @@ class _Download:
         parts = (state.product, state.version, f"part {state.part}" * bool(state.part), f"serial {state.serial}")
         head = [
             f"multidrop backup of {where}, {at.isoformat(' ', 'seconds')}",
-            "; ".join(each for each in parts[: 3 + bool(state.serial)] if each),
+            "; ".join(part for part in parts[: 3 + bool(state.serial)] if part),
             *(["names in the drive:", *(f"  {name}" for name in held.names)] if held.names else ["no names"]),
         ]
         program = self._programs.file(held, True)
@@ -237,13 +237,13 @@ class _Download:
         if not await transferring(drive, self._programs.end()):
             return
         self._say("its program ran and was ended", warning=True)
-        deadline = self._session.now() + LIMIT
+        deadline = self._session.now() + END_TIMEOUT
         while await drive.busy() or not await still(drive):
             if self._session.now() >= deadline:
                 raise DriveError(
-                    f"{self._name}: its program goes on for {LIMIT:g} s; stop it (nothing was overwritten)"
+                    f"{self._name}: its program goes on for {END_TIMEOUT:g} s; stop it (nothing was overwritten)"
                 )
-            await asyncio.sleep(APART)
+            await asyncio.sleep(END_PERIOD)
 
     async def _send(self, origin: Origin, lines: Sequence[SourceLine], held: Held) -> Sequence[SourceLine]:
         """Send the file; a refusal names its line."""
@@ -252,7 +252,7 @@ class _Download:
         moves = any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines))
         begins = workspace.path.starting(origin, drive, parts=True) if moves else contextlib.nullcontext()
         if self._programs.size(lines) and drive.family.debugging is not None:
-            Sight(workspace, drive).changes()
+            ListingSight(workspace, drive).changes()
         try:
             async with begins:
                 with running(workspace, f"{self._name}: download") as job:
@@ -262,8 +262,8 @@ class _Download:
             error.args = (f"{self._file}:{text.removeprefix('line ') if text.startswith('line ') else f' {text}'}",)
             raise
         outside = [line.text for line in self._outside(lines)]
-        more = f" and {len(outside) - MOST} more" if len(outside) > MOST else ""
-        executed = f"; executed at once: {', '.join(outside[:MOST])}{more}" if outside else ""
+        more = f" and {len(outside) - MOST_LISTED_LINES} more" if len(outside) > MOST_LISTED_LINES else ""
+        executed = f"; executed at once: {', '.join(outside[:MOST_LISTED_LINES])}{more}" if outside else ""
         self._say(f"{self._file} downloaded, {counted(len(lines), 'line')}{executed}")
         return sent
 
@@ -288,11 +288,11 @@ class _Download:
         if held.locked:
             self._say("not verified: the program is locked now (LK=1)", warning=True)
             return
-        found = self._programs.differences(sent, held, before)
-        for each in found[:MOST]:
-            self._session.notify(in_words(self._file, each, self._name), warning=True)
-        if found:
-            count = counted(len(found), "line differs", "lines differ")
+        differences = self._programs.differences(sent, held, before)
+        for difference in differences[:MOST_LISTED_LINES]:
+            self._session.notify(in_words(self._file, difference, self._name), warning=True)
+        if differences:
+            count = counted(len(differences), "line differs", "lines differ")
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")
         size = self._programs.size(lines)
         self._say(f"verified, {counted(size, 'line')}")

@@ -20,7 +20,7 @@ FREEZE = 1.0
 """The time between two freezes, s."""
 FULL = 60.0
 """The shortest time between two full collections, s."""
-LONGEST = 3600.0
+LONGEST_UNCOLLECTED = 3600.0
 """The longest time between two full collections, s."""
 YOUNG = 1
 """The oldest generation collected before each freeze."""
@@ -43,7 +43,7 @@ def collected_at_rest(resting: Callable[[], bool]) -> Iterator[None]:
     def again() -> None:
         nonlocal full_at, timer
         waited = loop.time() - full_at
-        if waited >= LONGEST or (waited >= FULL and resting()):
+        if waited >= LONGEST_UNCOLLECTED or (waited >= FULL and resting()):
             full_at = loop.time()
             gc.unfreeze()
             gc.collect()

@@ -28,7 +28,7 @@ from multidrop.simulator.families import PROGRAMS
 if TYPE_CHECKING:
     from multidrop.dialects.language import Language
 
-MOST = 200
+MOST_COMPLETIONS = 200
 """The largest number of completions."""
 Found = Iterable[tuple[str, str]]
 """Texts, each with its meaning."""
@@ -49,11 +49,11 @@ def complete(workspace: Workspace, text: str) -> list[Completion]:
     start = len(text) - len(word)
     head = text[:start]
     if not head.strip() and word.startswith("/"):
-        found: Found = verbs(workspace)
+        candidates: Found = verbs(workspace)
     elif head.lstrip().startswith("/"):
-        found = _arguments(workspace, head.split(), word)
+        candidates = _arguments(workspace, head.split(), word)
     elif not head.strip() and word.startswith("@"):
-        found = ((f"@{target} ", meaning) for target, meaning in targets(workspace))
+        candidates = ((f"@{target} ", meaning) for target, meaning in targets(workspace))
     else:
         # The labels and variables of the drive that may end a line, then the words of its language.
         try:
@@ -71,12 +71,12 @@ def complete(workspace: Workspace, text: str) -> list[Completion]:
         drive = names_of(workspace, text)
         named = workspace.names.offered(drive, typed) if drive is not None else ()
         words = language.complete(word, product) if word else ()
-        return [Completion(name, meaning, start) for name, meaning in [*named, *words][:MOST]]
+        return [Completion(name, meaning, start) for name, meaning in [*named, *words][:MOST_COMPLETIONS]]
     folded = word.lower()
     fitting = dict(
-        (each, Completion(each, meaning, start)) for each, meaning in found if each.lower().startswith(folded)
+        (name, Completion(name, meaning, start)) for name, meaning in candidates if name.lower().startswith(folded)
     )
-    return list(fitting.values())[:MOST]
+    return list(fitting.values())[:MOST_COMPLETIONS]
 
 
 def hint(workspace: Workspace, text: str) -> str:
@@ -107,12 +107,12 @@ def names_of(workspace: Workspace, text: str) -> Drive | None:
 def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
     """The completions that a verb's usage allows here."""
     verb = VERBS.get(typed[0])
-    for each in verb.following(typed[1:]) if verb is not None else ():
-        if isinstance(each, Parameter):
-            for listed in each.argument.listed:
+    for parameter in verb.following(typed[1:]) if verb is not None else ():
+        if isinstance(parameter, Parameter):
+            for listed in parameter.argument.listed:
                 yield from offered(workspace, listed, word)
         else:
-            yield each
+            yield parameter
 
 
 def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
@@ -159,19 +159,19 @@ def offered(workspace: Workspace, listed: Listed, word: str) -> Found:
             yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
         case Listed.SIMULATED_DRIVE:
             cell = simulated_cell(workspace)
-            for each in cell.floor.drives if cell else ():
-                name = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
-                yield name, each.spec.personality
+            for drive in cell.floor.drives if cell else ():
+                name = drive.spec.name if drive.bus == workspace.selected_bus else f"{drive.bus}:{drive.spec.name}"
+                yield name, drive.spec.personality
         case Listed.KEY:
             yield from ((key, "") for key in KEYS)
         case Listed.MACRO | Listed.PAGE:
             with contextlib.suppress(Diagnostic):
-                found = workspace.macros.names() if listed is Listed.MACRO else workspace.macros.pages()
-                yield from [(name, "macro" if listed is Listed.MACRO else "page of keys") for name in found]
+                names = workspace.macros.names() if listed is Listed.MACRO else workspace.macros.pages()
+                yield from [(name, "macro" if listed is Listed.MACRO else "page of keys") for name in names]
         case Listed.PERSONALITY:
             yield from ((name, family) for family in PROGRAMS for name in simulated()[family].personalities)
         case Listed.URL:
-            yield from ((name, each.url) for name, each in workspace.settings.connections.items())
+            yield from ((name, connection.url) for name, connection in workspace.settings.connections.items())
             yield from ((form.prefix, form.meaning) for form in schemes().values())
             if word.startswith("sim:"):
                 cells = (f"sim:{name}" for name, _ in _files(word[4:]))
@@ -190,7 +190,7 @@ def _files(word: str) -> Found:
     base = folder + "/" if "/" in word else ""
     try:
         with os.scandir(base or ".") as entries:
-            found = sorted((entry.name, entry.is_dir()) for entry in entries if not entry.name.startswith("."))
+            entries_there = sorted((entry.name, entry.is_dir()) for entry in entries if not entry.name.startswith("."))
     except OSError:
         return []
-    return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in found]
+    return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in entries_there]

@@ -34,9 +34,9 @@ STOP_KEY = b"\x18"
 STOP = STOP_KEY.decode()
 END_OF_INPUT = b"\x04"
 """Ctrl+D."""
-AT_ONCE = 64
+MOST_KEYS_AT_ONCE = 64
 """The characters passed on in one turn of the event loop: the stop key waits for no more than these."""
-READ = 4096
+READ_BYTES = 4096
 SWITCH = 0.0005
 """The time after which the loop's thread yields to the reading thread, s: the next bytes may hold a stop."""
 
@@ -101,9 +101,9 @@ class Keyboard:
 
     def take(self) -> str:
         """Take the next characters, at most up to the end of a line."""
-        piece = self._typed[:AT_ONCE]
-        ends = [found + 1 for end in "\r\n" if (found := piece.find(end)) >= 0]
-        piece = piece[: min(ends, default=AT_ONCE)]
+        piece = self._typed[:MOST_KEYS_AT_ONCE]
+        ends = [at + 1 for end in "\r\n" if (at := piece.find(end)) >= 0]
+        piece = piece[: min(ends, default=MOST_KEYS_AT_ONCE)]
         self._typed = self._typed[len(piece) :]
         if self._typed:
             self._loop.call_soon(self._call_listener)
@@ -134,7 +134,7 @@ class Keyboard:
         """Read until the end, or until the terminal is gone. In a thread: the loop cannot delay it."""
         while over not in select.select([self.descriptor, over], [], [])[0]:
             try:
-                data = os.read(self.descriptor, READ)
+                data = os.read(self.descriptor, READ_BYTES)
             except OSError:
                 data = b""  # EIO: the terminal is gone
             if STOP_KEY in data:
@@ -151,8 +151,8 @@ class Keyboard:
             self.gone()
         early, self._early = data[: self._early], max(0, self._early - len(data))
         data = early.replace(b"\0", END_OF_INPUT) + data[len(early) :]
-        before, found, behind = data.rpartition(STOP_KEY)
-        if found:
+        before, stopped, behind = data.rpartition(STOP_KEY)
+        if stopped:
             dropped, self._typed = self._typed + self._decoder.decode(before), ""
             self._decoder.reset()
             self.stop(dropped.replace(STOP, ""))

@@ -22,13 +22,13 @@ from prompt_toolkit.key_binding.bindings.cpr import load_cpr_bindings
 from prompt_toolkit.keys import Keys
 
 from multidrop.shell.prompt.keyboard import Keyboard
-from multidrop.shell.prompt.terminal_input import GO_ON, Answer
+from multidrop.shell.prompt.terminal_input import GO_ON, TypedAnswer
 
 BEGIN, END = "\x1b[200~", "\x1b[201~"
 """The marks around a paste."""
 LEAVE = "\x03"
 """Ctrl+C, which drops a paste that does not end."""
-STALLED = 1.0
+PASTE_TIMEOUT = 1.0
 """The time without a byte, s, after which an unfinished paste is reported."""
 CURSOR = re.compile("\x1b\\[[0-9]+;[0-9]+R")
 
@@ -75,8 +75,8 @@ class KeyboardInput(Input):
     def read_keys(self) -> list[KeyPress]:
         """The next keys, of one line at most; after an Enter only the terminal's cursor reports."""
         if self._resting:
-            found = CURSOR.search(self.keyboard.typed)
-            self._parser.feed(self.keyboard.pick(*found.span()) if found else "")
+            match = CURSOR.search(self.keyboard.typed)
+            self._parser.feed(self.keyboard.pick(*match.span()) if match else "")
             return self._parsed()
         text = self.keyboard.take()
         if self._stalled and text == LEAVE:
@@ -108,7 +108,7 @@ class KeyboardInput(Input):
             self._stall.cancel()
         self._stalled = False
         pasting = self._pasted is not None
-        self._stall = asyncio.get_running_loop().call_later(STALLED, self._stalls) if pasting else None
+        self._stall = asyncio.get_running_loop().call_later(PASTE_TIMEOUT, self._stalls) if pasting else None
 
     def _stalls(self) -> None:
         self._stalled = True
@@ -189,7 +189,7 @@ class PromptQuestion:
         self._app, self._begin, self._stop = app, begin, stop
         self._typed = ""
         """What was typed on the question's line: `/stop` and Enter stop there, too, where Ctrl+X may not come."""
-        self._answer: Answer | None = None
+        self._answer: TypedAnswer | None = None
         self._given: asyncio.Future[bool] | None = None
         self.shown = ""
         """The open question; empty: there is none."""
@@ -222,7 +222,7 @@ class PromptQuestion:
     async def _quiet(self, shown: str) -> None:
         """Show a question, and wait until keys pause."""
         loop = asyncio.get_running_loop()
-        self.shown, self._typed, self._answer = shown, "", Answer(loop.time())
+        self.shown, self._typed, self._answer = shown, "", TypedAnswer(loop.time())
         self._draw()
         while (left := self._answer.quiet_at() - loop.time()) > 0:
             await asyncio.sleep(left)
@@ -253,8 +253,8 @@ class PromptQuestion:
         bindings.add(Keys.Any, filter=self.open, eager=True)(lambda event: self._key("", event.data))
         for name in ("c-d", "escape"):
             bindings.add(name, filter=self.taking, eager=True)(lambda event: self.no())
-        for each in load_cpr_bindings().bindings:  # the terminal's cursor reports are no keys
-            bindings.add(*each.keys, filter=self.open, eager=True, save_before=each.save_before)(each.handler)
+        for binding in load_cpr_bindings().bindings:  # the terminal's cursor reports are no keys
+            bindings.add(*binding.keys, filter=self.open, eager=True, save_before=binding.save_before)(binding.handler)
 
     def _ahead(self) -> None:
         """Note a key before keys answer."""
@@ -269,9 +269,9 @@ class PromptQuestion:
         if ends and before == STOP_LINE:
             self._stop()
             return
-        found = self._answer.key(key, asyncio.get_running_loop().time())
-        if found is not None:
-            self._given.set_result(found)
+        answered = self._answer.key(key, asyncio.get_running_loop().time())
+        if answered is not None:
+            self._given.set_result(answered)
 
     def _draw(self) -> None:
         if self._app.is_running:

@@ -36,10 +36,10 @@ from multidrop.shell.origin import LastLine, Origin
 from multidrop.shell.quitting import ENDING
 from multidrop.shell.session import BARE_WORDS, Session
 
-KEPT = 5000
+MOST_HISTORY_LINES = 5000
 """The number of lines read back; a file of twice as many is cut to that number."""
 PRIVATE = 0o600
-TRIES = 3
+WRITE_TRIES = 3
 MOMENT = 0.2
 """The longest wait for another process that writes, s."""
 TORN = "\0"
@@ -55,13 +55,13 @@ class History:
     def lines(self) -> list[str]:
         """The lines of the file, oldest first."""
         try:
-            found = read_private(self.path).decode("utf-8", "replace").replace("\r\n", "\n").split("\n")
+            entered = read_private(self.path).decode("utf-8", "replace").replace("\r\n", "\n").split("\n")
         except OSError:
             return []
-        lines = [line for line in found[:-1] if _whole(line)]
-        if len(lines) > 2 * KEPT:
+        lines = [line for line in entered[:-1] if _whole(line)]
+        if len(lines) > 2 * MOST_HISTORY_LINES:
             self._cut()
-        return lines[-KEPT:]
+        return lines[-MOST_HISTORY_LINES:]
 
     def append(self, line: str) -> None:
         """Append a line; empty lines and texts of several lines are left out."""
@@ -77,7 +77,9 @@ class History:
 
         def write_last(data: bytes) -> None:
             lines = [line for line in data.split(b"\n")[:-1] if _whole(line.decode("utf-8", "replace"))]
-            write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE, private=True)
+            write_atomically(
+                self.path, b"".join(line + b"\n" for line in lines[-MOST_HISTORY_LINES:]), PRIVATE, private=True
+            )
 
         if sys.platform == "win32":  # where an open file is not replaced
             with contextlib.suppress(OSError), self._alone() as locked:
@@ -104,11 +106,11 @@ class History:
                 finally:
                     os.close(descriptor)
             return
-        for tried in range(TRIES):
+        for tried in range(WRITE_TRIES):
             descriptor = open_private(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE)
             try:
                 locked = _lock(descriptor)
-                if tried + 1 == TRIES or _is_at(descriptor, self.path):
+                if tried + 1 == WRITE_TRIES or _is_at(descriptor, self.path):
                     yield descriptor, locked
                     return
             finally:
@@ -171,14 +173,14 @@ def _gap(descriptor: int) -> str:
 
 BURST = 0.5
 """The time between two Enters, s, below which no person can have read the reply to the first."""
-SHOWN = 10
+MOST_SHOWN_UNSENT = 10
 """The number of unsent lines that are shown one by one."""
 LEAVING = ("/quit", "/exit")
 """The verbs of a quit: they run at once, as `/stop` does, whatever waits or failed."""
 
 
 @dataclass(frozen=True)
-class Line:
+class EnteredLine:
     """A line at its Enter: parsed once, with the count of stops and the drive that was selected."""
 
     text: str
@@ -189,7 +191,7 @@ class Line:
     """None: it cannot be parsed, which the session reports at its turn."""
 
     @classmethod
-    def entered(cls, text: str, since: int, place: Place = NOWHERE) -> Line:
+    def entered(cls, text: str, since: int, place: Place = NOWHERE) -> EnteredLine:
         try:
             return cls(text, since, place, parse(text))
         except Diagnostic:
@@ -224,7 +226,7 @@ class LineQueue:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._origin = Origin(last=LastLine())
-        self._waiting: asyncio.Queue[tuple[int, Line]] = asyncio.Queue()
+        self._waiting: asyncio.Queue[tuple[int, EnteredLine]] = asyncio.Queue()
         """Lines with their numbers."""
         self._entered_lines = 0
         self._entered = 0.0
@@ -266,9 +268,9 @@ class LineQueue:
             self._session.notify(f"{problem}; nothing was sent", warning=True)
             return
         for line in lines:
-            self._take(Line.entered(line, self._session.stops, self._session.place), alone=len(lines) == 1)
+            self._take(EnteredLine.entered(line, self._session.stops, self._session.place), alone=len(lines) == 1)
 
-    def _take(self, line: Line, alone: bool) -> None:
+    def _take(self, line: EnteredLine, alone: bool) -> None:
         """Take a line. A quit goes ahead, unless it is one of several lines that were entered together (a paste)."""
         concurrent, leaves = _concurrent(line), line.leaves(self._session)
         if line.verb == "/stop":
@@ -316,7 +318,7 @@ class LineQueue:
             if line.verb in ("/use", "/rename"):
                 self._meant = self._entered_lines, self._session.place
 
-    def _not_now(self, number: int, line: Line) -> str:
+    def _not_now(self, number: int, line: EnteredLine) -> str:
         """Why a line is not sent at its turn; empty: it is. After `/close` nothing goes to another bus by itself."""
         if line.since != self._session.stops:
             return ""  # the session says so
@@ -353,11 +355,11 @@ class LineQueue:
 
     def show_unsent(self, why: str, lines: Sequence[str]) -> None:
         lines = [shown(line) for line in lines if line.strip()]
-        for line in lines[:SHOWN]:
+        for line in lines[:MOST_SHOWN_UNSENT]:
             self._session.notify(f"not sent, as {why}: {line}", warning=True)
-        if len(lines) > SHOWN:
+        if len(lines) > MOST_SHOWN_UNSENT:
             self._session.notify(
-                f"{counted(len(lines) - SHOWN, 'more line was', 'more lines were')} not sent", warning=True
+                f"{counted(len(lines) - MOST_SHOWN_UNSENT, 'more line was', 'more lines were')} not sent", warning=True
             )
 
 
@@ -366,7 +368,7 @@ def shown(line: str) -> str:
     return visible(re.sub("\x1b\\[20[01]~", "", line), tabs=True).strip()
 
 
-def _concurrent(line: Line) -> bool:
+def _concurrent(line: EnteredLine) -> bool:
     """True if a line runs beside those that are typed after it."""
     if not line.verb:
         return False

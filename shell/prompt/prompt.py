@@ -52,7 +52,7 @@ from multidrop.shell.prompt.view import LinesAbove, Pager, PlainOutput, SessionC
 from multidrop.shell.quitting import ENDING
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
-from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.event_printer import EventPrinter
 from multidrop.shell.streams.stdout import fail, finish, nonblocking, write
 
 STYLE = Style.from_dict(
@@ -81,13 +81,13 @@ def run(
     too. `raw`: the URLs are opened in raw mode. `prepare`: takes the session before a URL is opened.
     """
     try:
-        found = configuration.load(lenient=True)
+        settings = configuration.load(lenient=True)
     except FAILURES as failure:
         return fail(failure)
-    write(sys.stderr, *map(str, found.problems))
+    write(sys.stderr, *map(str, settings.problems))
     try:
         with early_ends():  # before the log has its thread
-            make = partial(_session, partial(Session, found, reconnect=reconnect, raw=raw), prepare)
+            make = partial(_session, partial(Session, settings, reconnect=reconnect, raw=raw), prepare)
             return asyncio.run(_run(make, urls, agreed, beyond))
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -103,7 +103,7 @@ async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, b
     with nonblocking() as streams, ExitStack() as stack:
         session = make()
         session.questions.agreed, session.questions.beyond = agreed, beyond
-        session.subscribe(Printer(talkative=True).show)
+        session.subscribe(EventPrinter(talkative=True).show)
         begin_log(session)
         stack.enter_context(collected_at_rest(partial(at_rest, session)))
         descriptor, input_ = terminal(), None

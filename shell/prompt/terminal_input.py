@@ -15,18 +15,18 @@ from functools import partial
 
 from multidrop.base.comments import uncommented
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import LARGEST, check_line, split_lines
+from multidrop.base.files import LARGEST_FILE, check_line, split_lines
 from multidrop.base.text import visible
-from multidrop.shell.channel import Ask, Field
+from multidrop.shell.channel import Ask, AskedValue
 from multidrop.shell.prompt.keyboard import Keyboard, on_stop_key
 from multidrop.shell.quitting import say_unsent
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write
 
-QUIET = 0.5
+RAW_QUIET_TIME = 0.5
 """The quiet time that ends the input of a line in raw mode, s."""
 INPUT = "standard input"
-AHEAD = 4
+MOST_LINES_AHEAD = 4
 """The number of reads of standard input that may wait for their lines to run."""
 
 
@@ -54,7 +54,7 @@ async def run_stream(session: Session, descriptor: int) -> None:
         if session.quitting:
             say_unsent(session, map(uncommented, behind))
             return
-    while (left := max((raw.last + QUIET - session.now() for raw in session.raw.values()), default=0.0)) > 0:
+    while (left := max((raw.last + RAW_QUIET_TIME - session.now() for raw in session.raw.values()), default=0.0)) > 0:
         await asyncio.sleep(left)
 
 
@@ -67,7 +67,7 @@ async def stream_lines(descriptor: int, left: deque[str] | None = None) -> Async
     """
     loop = asyncio.get_running_loop()
     queue: asyncio.Queue[bytes] = asyncio.Queue()
-    room = threading.Semaphore(AHEAD)
+    room = threading.Semaphore(MOST_LINES_AHEAD)
 
     def hand_over(data: bytes) -> None:
         if not loop.is_closed():
@@ -86,8 +86,10 @@ async def stream_lines(descriptor: int, left: deque[str] | None = None) -> Async
     left = deque() if left is None else left
     while data := await queue.get():
         *whole, rest = (rest + data).split(b"\n")
-        if len(rest) > LARGEST:
-            raise Diagnostic(f"a line is larger than {LARGEST // 1024**2} MB", f"{INPUT}:{number + len(whole) + 1}")
+        if len(rest) > LARGEST_FILE:
+            raise Diagnostic(
+                f"a line is larger than {LARGEST_FILE // 1024**2} MB", f"{INPUT}:{number + len(whole) + 1}"
+            )
         left.extend(line.removesuffix(b"\r").decode("utf-8", "replace") for line in whole)
         while left:
             number += 1
@@ -107,14 +109,14 @@ async def stream_lines(descriptor: int, left: deque[str] | None = None) -> Async
 
 
 GO_ON = "Go on? [y/N]"
-PAUSE = 0.5
+TYPING_PAUSE = 0.5
 """The time without a key, s, after which a key counts: until then it may have been typed ahead."""
 YES = ("y", "Y")
 NO = ("n", "N", "\r", "\n", "\x1b", "\x03", "\x04")
 """No, Enter, Escape, Ctrl+C and Ctrl+D."""
 
 
-class Answer:
+class TypedAnswer:
     """The answer to a question that is shown from `at` on, s."""
 
     def __init__(self, at: float) -> None:
@@ -122,7 +124,7 @@ class Answer:
 
     def quiet_at(self) -> float:
         """The time from which a key counts, if none comes before."""
-        return self._last + PAUSE
+        return self._last + TYPING_PAUSE
 
     def key(self, key: str, at: float) -> bool | None:
         """Take a key; return the answer, None if it is none."""
@@ -139,13 +141,13 @@ async def at_keyboard(keyboard: Keyboard, question: str) -> bool:
     answered: asyncio.Future[bool] = loop.create_future()
     keyboard.forget()
     write(sys.stderr, f"{question}. {GO_ON}")
-    answer = Answer(loop.time())
+    answer = TypedAnswer(loop.time())
 
     def listen() -> None:
         for key in keyboard.take():
-            found = answer.key(key, loop.time())
-            if found is not None and not answered.done():
-                answered.set_result(found)
+            agreed = answer.key(key, loop.time())
+            if agreed is not None and not answered.done():
+                answered.set_result(agreed)
 
     before = keyboard.listen(listen)
     try:
@@ -160,8 +162,8 @@ async def ask_outside_a_session(question: str) -> bool | None:
     answering: list[asyncio.Future[bool]] = []
 
     def end() -> None:
-        for each in answering:
-            each.cancel()
+        for future in answering:
+            future.cancel()
 
     with on_stop_key(lambda: None, end, end) as keyboard:
         ask = asker(keyboard)
@@ -182,12 +184,12 @@ def asker(keyboard: Keyboard | None) -> Ask | None:
 NEEDED = "a value is needed; Ctrl+C gives up"
 
 
-def question(title: str, field: Field) -> str:
+def question(title: str, field: AskedValue) -> str:
     default = f" [{field.default}]" if field.default is not None else ""
     return visible(f"{title}: {field.name}, {field.valid}{default}: ")
 
 
-def problem(field: Field, text: str) -> str:
+def problem(field: AskedValue, text: str) -> str:
     """Describe what is wrong with an answer; empty: nothing. An empty answer stands for the default."""
     if not text and field.default is None:
         return NEEDED
@@ -195,7 +197,7 @@ def problem(field: Field, text: str) -> str:
 
 
 async def filled(
-    ask: Callable[[str], Awaitable[str | None]], tell: Callable[[str], None], title: str, fields: Sequence[Field]
+    ask: Callable[[str], Awaitable[str | None]], tell: Callable[[str], None], title: str, fields: Sequence[AskedValue]
 ) -> dict[str, str] | None:
     """Ask for each value until it is valid; None once the person gives up."""
     answers: dict[str, str] = {}
@@ -211,7 +213,7 @@ async def filled(
     return answers
 
 
-def at_terminal(title: str, fields: Sequence[Field]) -> dict[str, str] | None:
+def at_terminal(title: str, fields: Sequence[AskedValue]) -> dict[str, str] | None:
     """Ask at the terminal of a command, before it opens anything; None at the end of the input."""
     answers: dict[str, str] = {}
     for field in fields:

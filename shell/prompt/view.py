@@ -33,17 +33,17 @@ from multidrop.shell.prompt import complete
 from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.session import Session
 from multidrop.shell.streams.event_printer import laid_out
-from multidrop.shell.streams.output_streams import Colour, LineStream, Outlet
+from multidrop.shell.streams.output_streams import Colour, LineStream, OutputStream
 from multidrop.shell.threads import Loss
 from multidrop.shell.workspace import Workspace
 
-MOST = 1000
+MOST_HELD_LINES = 1000
 """The largest number of lines that wait for a terminal that takes none."""
 BURST = 50_000
 """The largest number of lines between two updates of a terminal that takes them."""
-PATIENCE = 0.1
+STUCK_AFTER = 0.1
 """The time, s, after which a terminal that does not keep up counts as one that takes none."""
-PAUSE = 0.1
+UPDATE_PAUSE = 0.1
 """The time between two updates, s."""
 MANY = 10
 """The number of lines in one update that are too many to read."""
@@ -51,7 +51,7 @@ LONG_PAUSE = 0.2
 """The time after an update of as many, s: each one draws the prompt again."""
 BREATH = 0.01
 """The time between two updates while lines wait, s."""
-SLICE = 0.05
+LONGEST_UPDATE = 0.05
 """The longest time, s, for which an update hides the prompt."""
 BELOW = 4
 """The rows that a page of help leaves free: the prompt, its toolbar, the line about more, a row of the page before."""
@@ -60,7 +60,7 @@ CHUNK = 16 * 1024
 """The number of characters after which the terminal is asked whether it keeps up; less than a writer's limit."""
 
 
-class Stream(LineStream):
+class PromptStream(LineStream):
     """A text stream whose lines appear above the prompt. `keep`: never drop a line (warnings and failures)."""
 
     def __init__(self, lines: LinesAbove, keep: bool, colour: str = "") -> None:
@@ -68,7 +68,7 @@ class Stream(LineStream):
         self._begun = ""
 
     def coloured(self, colour: Colour) -> LineStream:
-        return Stream(self._lines, self._keep, colour.value) if self._lines.coloured else self
+        return PromptStream(self._lines, self._keep, colour.value) if self._lines.coloured else self
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
@@ -110,14 +110,14 @@ class LinesAbove:
         self._damaged = False
         """Parts of the prompt were lost on their way to the terminal."""
         stdout = getattr(app.output, "stdout", None)
-        self._writer = stdout.writer if isinstance(stdout, Outlet) else None
+        self._writer = stdout.writer if isinstance(stdout, OutputStream) else None
         self.on_terminal = stdout is not None and stdout.isatty()
         self.coloured = self.on_terminal and app.color_depth is not ColorDepth.DEPTH_1_BIT
 
     def add(self, lines: Sequence[str], keep: bool) -> None:
         """Queue lines; the oldest give way."""
         self._lines.extend([(line, keep) for line in lines])
-        self._make_way(MOST if self._stuck else BURST)
+        self._make_way(MOST_HELD_LINES if self._stuck else BURST)
         self._something.set()
 
     def _make_way(self, most: int) -> None:
@@ -140,9 +140,9 @@ class LinesAbove:
         notice = self._writer.notice if self._writer else None
         if self._writer:
             self._writer.notice = self._lost
-        sys.stderr = cast(TextIO, Stream(self, keep=True))
+        sys.stderr = cast(TextIO, PromptStream(self, keep=True))
         if sys.stdout.isatty():
-            sys.stdout = cast(TextIO, Stream(self, keep=False))
+            sys.stdout = cast(TextIO, PromptStream(self, keep=False))
         try:
             yield
         finally:
@@ -165,7 +165,7 @@ class LinesAbove:
             # Wait until the terminal has taken what was written, and the prompt may be hidden.
             since = self._loop.time()
             while self._behind or (self.app.is_running and self.app.is_done):
-                self._stuck = self._behind and self._loop.time() > since + PATIENCE
+                self._stuck = self._behind and self._loop.time() > since + STUCK_AFTER
                 await asyncio.sleep(0.01)
             self._stuck = False
             self._something.clear()
@@ -176,7 +176,7 @@ class LinesAbove:
             many = len(self._lines) >= MANY
             async with in_terminal():
                 # Write chunks until nothing waits, or the prompt must be drawn again.
-                until = self._loop.time() + SLICE
+                until = self._loop.time() + LONGEST_UPDATE
                 while self._waits and self._loop.time() < until:
                     if self._behind:
                         await asyncio.sleep(0.001)
@@ -185,7 +185,7 @@ class LinesAbove:
                         await asyncio.sleep(0)
                 if self._waits:
                     self._something.set()
-            await asyncio.sleep(BREATH if self._lines else LONG_PAUSE if many else PAUSE)
+            await asyncio.sleep(BREATH if self._lines else LONG_PAUSE if many else UPDATE_PAUSE)
 
     @property
     def _waits(self) -> bool:
@@ -323,7 +323,7 @@ class Toolbar:
         parts = [
             f"✗ {session.selected_bus} lost" if session.selected_bus in session.reconnections.trying else "",
             stop_report.headline(session.tally(), room) if session.latched else "",
-            " ".join(f"▶ {each.short}" for each in session.playing),
+            " ".join(f"▶ {macro.short}" for macro in session.playing),
             f"recording {session.recording}" if session.recording else "",
             f"log {session.log.path.name}" if session.log else "",
             self._running(),
@@ -359,8 +359,8 @@ class SessionCompleter(Completer):
         text = document.text_before_cursor
         if not text.strip():
             return
-        for each in complete.complete(self._workspace, text):
-            yield Completion(each.text, each.start - len(text), display_meta=each.meaning)
+        for completion in complete.complete(self._workspace, text):
+            yield Completion(completion.text, completion.start - len(text), display_meta=completion.meaning)
 
     async def get_completions_async(
         self, document: Document, complete_event: CompleteEvent
@@ -371,8 +371,8 @@ class SessionCompleter(Completer):
         reading = self._workspace.names.ask(drive) if asked and drive is not None else None
         if reading is not None:
             await asyncio.wait([reading], timeout=NAMES_WAIT)
-        for each in self.get_completions(document, complete_event):
-            yield each
+        for completion in self.get_completions(document, complete_event):
+            yield completion
 
 
 class SharedHistory(PromptHistory):

@@ -14,7 +14,7 @@ from multidrop.shell.channel import Channel
 from multidrop.shell.events import Entered, OnBus, Output, Printed, SessionEvent
 from multidrop.shell.origin import LastLine, Origin
 
-KEPT = 10_000
+MOST_CAPTURED_LINES = 10_000
 """The number of lines kept."""
 
 
@@ -22,7 +22,7 @@ class Hearing:
     """The lines since the last line that `/expect` may look at, and where the line under way went."""
 
     def __init__(self) -> None:
-        self._lines: deque[tuple[str, bool]] = deque(maxlen=KEPT)
+        self._lines: deque[tuple[str, bool]] = deque(maxlen=MOST_CAPTURED_LINES)
         """Each line, and whether `/expect` may find something in it: not in what the script prints itself."""
         self._own = False
         self._count = 0

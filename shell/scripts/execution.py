@@ -18,7 +18,7 @@ from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
 from multidrop.shell.motions import check_own
-from multidrop.shell.operations.operation import Kind, Scripted
+from multidrop.shell.operations.operation import Scripted, VerbKind
 from multidrop.shell.operations.table import script_verb
 from multidrop.shell.origin import Origin
 from multidrop.shell.playing import Playing, StepProgress
@@ -29,22 +29,22 @@ from multidrop.shell.scripts.model import (
     CallMacro,
     Executed,
     If,
+    LineResult,
     MacroScript,
     Node,
     Repeat,
-    Result,
     ScriptLine,
 )
 from multidrop.shell.scripts.planning import bind
-from multidrop.shell.scripts.questions import Place
-from multidrop.shell.scripts.use import CheckFailed, Use, chosen
+from multidrop.shell.scripts.questions import MacroSelection
+from multidrop.shell.scripts.use import CheckFailed, LineUse, chosen
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import LATCHED
 
 # The pace of a macro: as recorded, or as fast as its lines are done.
 
 
-class Pace:
+class ScriptPace:
     """Waits before each line. A line starts its time after the start of the line before it, or when that is done."""
 
     def __init__(self, now: Callable[[], float], fast: bool = False) -> None:
@@ -61,7 +61,7 @@ class Pace:
         self._begun = self._now()
 
 
-SHOWN = 3
+MOST_SHOWN_PLACES = 3
 """The number of lines that a failed `/expect` shows."""
 CUT = "ended before it was done"
 """The error of a line that was under way at the end of its script."""
@@ -73,15 +73,15 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Frame:
+class ScriptFrame:
     """The common state of the lines of one file or macro."""
 
     values: Values | None
     """None: lines are executed as typed."""
     origin: Origin
-    place: Place | None = None
+    place: MacroSelection | None = None
     """The selection of a macro; None: lines go to what is selected as they run."""
-    pace: Pace | None = None
+    pace: ScriptPace | None = None
     """The pace of a macro; None: a line follows at once."""
     playing: Playing | None = None
 
@@ -96,11 +96,11 @@ class Unfinished:
     """A macro that ended early, and how far it was."""
 
     played: MacroScript
-    frame: Frame
+    frame: ScriptFrame
     playing: Playing
 
 
-Work = Callable[[str, Frame], Awaitable[T]]
+Work = Callable[[str, ScriptFrame], Awaitable[T]]
 
 
 @dataclass
@@ -117,7 +117,7 @@ class Execution:
         """The number of stops of everything before it began."""
         self.unfinished: list[Unfinished] = []
         """The macros that ended early, the innermost first."""
-        self.recent: deque[Result] = deque(maxlen=RECENT)
+        self.recent: deque[LineResult] = deque(maxlen=RECENT)
         """The last results."""
         self.addressed: dict[tuple[str, str], None] = {}
         """(bus, address) of the drives that its lines went to."""
@@ -135,10 +135,12 @@ class Execution:
         if not self.failed:
             return
         places = list(dict.fromkeys(self.failed))
-        more = f" and {counted(len(places) - SHOWN, 'other place')}" if len(places) > SHOWN else ""
+        more = (
+            f" and {counted(len(places) - MOST_SHOWN_PLACES, 'other place')}" if len(places) > MOST_SHOWN_PLACES else ""
+        )
         times = "a /verify" if len(self.failed) == 1 else f"{len(self.failed)} times a /verify"
         self.session.automations.leave(origin)  # it has come to its end: what moves goes on, as after a good one
-        raise CheckFailed(f"{times} did not hold: {', '.join(places[:SHOWN])}{more}; the rest was done")
+        raise CheckFailed(f"{times} did not hold: {', '.join(places[:MOST_SHOWN_PLACES])}{more}; the rest was done")
 
     @property
     def _quits(self) -> bool:
@@ -153,7 +155,7 @@ class Execution:
         times: int | None,
         fast: bool,
         roles: Mapping[str, str],
-        caller: Place | None = None,
+        caller: MacroSelection | None = None,
     ) -> Playing:
         """Play a macro: one round, several, or until it is ended.
 
@@ -162,7 +164,9 @@ class Execution:
         workspace, macro = self.session, played.macro
         playing = Playing(macro.name, len(macro.steps), times, macro.key)
         origin = replace(origin.cast(roles), by=By.MACRO)
-        frame = Frame(values, origin, Place(workspace, origin, caller), Pace(workspace.now, fast), playing)
+        frame = ScriptFrame(
+            values, origin, MacroSelection(workspace, origin, caller), ScriptPace(workspace.now, fast), playing
+        )
         with self._listed(playing):
             try:
                 while times is None or playing.rounds < times:
@@ -194,7 +198,7 @@ class Execution:
                 workspace.playing[-1].progress.show()
             workspace.changed()
 
-    async def block(self, body: Sequence[Node], frame: Frame) -> None:
+    async def block(self, body: Sequence[Node], frame: ScriptFrame) -> None:
         """Execute steps in turn, up to a `/quit`."""
         for node in body:
             if self._quits:
@@ -219,24 +223,24 @@ class Execution:
             else:
                 await self._step(node.line, frame)
 
-    async def _repeat(self, node: Repeat, frame: Frame) -> None:
+    async def _repeat(self, node: Repeat, frame: ScriptFrame) -> None:
         """Execute a block a number of times, or as its condition says before each round."""
-        counted = _scripted(node.line).kind is Kind.COUNT
+        counted = _scripted(node.line).kind is VerbKind.COUNT
         left = await self._own(node.line, frame, self._done) if counted else 0
         while not self._quits and (left > 0 if counted else await self._goes_on(node.line, frame)):
             left -= 1
             await asyncio.sleep(0)  # a body that sends nothing must not delay a stop
             await self.block(node.body, frame)
 
-    async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
+    async def _goes_on(self, line: ScriptLine, frame: ScriptFrame) -> bool:
         """Whether a loop has another round; one that waits for a motion which has failed ends with that failure."""
         goes_on: bool = await self._own(line, frame, self._done)
         if goes_on and not self.is_over:
             await self._own(line, frame, lambda text, frame: check_own(self.session, frame.origin))
         return goes_on
 
-    async def _play(self, node: CallMacro, frame: Frame) -> None:
-        async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
+    async def _play(self, node: CallMacro, frame: ScriptFrame) -> None:
+        async def values(text: str, frame: ScriptFrame) -> tuple[Values, Mapping[str, str]]:
             call = words.macro_call(text)
             given, roles = call.divided(node.played.macro)
             return checked_values(node.played.macro, given), bind(self.session, frame.origin, node.played.macro, roles)
@@ -246,7 +250,7 @@ class Execution:
             fast = node.fast or (frame.pace is not None and frame.pace.fast)
             await self.play(frame.origin, node.played, given, node.times, fast, roles, frame.place)
 
-    async def _step(self, line: ScriptLine, frame: Frame) -> None:
+    async def _step(self, line: ScriptLine, frame: ScriptFrame) -> None:
         if script_verb(line.word) is None:
             return await self.line(line, frame)
         scripted = _scripted(line)
@@ -258,7 +262,7 @@ class Execution:
             self.failed.append(line.where)
             self.session.notify(f"{line.where}: {failure}", warning=True)
 
-    async def line(self, line: ScriptLine, frame: Frame) -> None:
+    async def line(self, line: ScriptLine, frame: ScriptFrame) -> None:
         """Execute an ordinary line, with values filled in if there are any."""
         outcome: list[str] = []
         origin = replace(frame.origin, outcome=outcome)
@@ -273,7 +277,7 @@ class Execution:
         if self._quits and line.where:
             self.session.notify(f"{line.where}: it quits here, and nothing after this line is executed", warning=True)
 
-    async def _own(self, line: ScriptLine, frame: Frame, work: Work[T], counts: bool = False) -> T:
+    async def _own(self, line: ScriptLine, frame: ScriptFrame, work: Work[T], counts: bool = False) -> T:
         """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""
         with self._reporting(line, frame, counts=counts) as reported:
             reported.sent = text = fill(line.text, frame.names)
@@ -292,7 +296,7 @@ class Execution:
 
     @contextlib.contextmanager
     def _reporting(
-        self, line: ScriptLine, frame: Frame, counts: bool = True, afresh: bool = False
+        self, line: ScriptLine, frame: ScriptFrame, counts: bool = True, afresh: bool = False
     ) -> Iterator[_Reported]:
         """Report the result of the body; note the place of the line on its failure."""
         self._heard.begin(afresh)
@@ -317,18 +321,21 @@ class Execution:
                 now, at = self.session.now(), self.session.wall(begun)
                 number = frame.playing.round if frame.playing is not None else 0
                 printed = self._heard.printed()
-                result = Result(line, reported.sent, at, now - begun, printed, bus, drive, error, failed_check, number)
+                result = LineResult(
+                    line, reported.sent, at, now - begun, printed, bus, drive, error, failed_check, number
+                )
                 self.recent.append(result)
                 self._executed(result)
 
-    async def _done(self, text: str, frame: Frame) -> Any:
+    async def _done(self, text: str, frame: ScriptFrame) -> Any:
         """Do what a verb of scripts does; return what that returns."""
-        found = chosen(text)
-        return await found.form.done(
-            Use(self.session, self._heard, frame.names, frame.place, frame.origin, found.form.name, text), found.values
+        form = chosen(text)
+        return await form.form.done(
+            LineUse(self.session, self._heard, frame.names, frame.place, frame.origin, form.form.name, text),
+            form.values,
         )
 
-    async def _given(self, text: str, frame: Frame) -> Values:
+    async def _given(self, text: str, frame: ScriptFrame) -> Values:
         return words.call(text)[1]
 
 
@@ -348,7 +355,7 @@ def _noted(line: ScriptLine) -> Iterator[None]:
         raise
 
 
-def _shown(text: str, frame: Frame) -> str:
+def _shown(text: str, frame: ScriptFrame) -> str:
     """A line with its values, as a person reads it while it is executed; as it stands where one is not known yet."""
     try:
         return fill(text, frame.names)

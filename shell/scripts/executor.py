@@ -23,8 +23,8 @@ from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.origin import NO_ROLES, Origin
 from multidrop.shell.quitting import say_unsent
 from multidrop.shell.scripts.captured_prints import hearing
-from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
-from multidrop.shell.scripts.model import Ended, Ending, Executed, MacroScript, Result, Script, ScriptLine
+from multidrop.shell.scripts.execution import CUT, Execution, ScriptFrame, Unfinished
+from multidrop.shell.scripts.model import Ended, Executed, LineResult, MacroEnding, MacroScript, Script, ScriptLine
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
 from multidrop.shell.scripts.reading import read_macro
 from multidrop.shell.session import Session
@@ -90,7 +90,7 @@ async def run_script(
             ended_by_loss(execution, {link.name for link, _ in own}),
             ending(execution, running, lambda end: None),
         ):
-            await execution.block(script.body, Frame(dict(script.values), replace(running, by=By.SCRIPT)))
+            await execution.block(script.body, ScriptFrame(dict(script.values), replace(running, by=By.SCRIPT)))
     execution.check_verified(origin)
 
 
@@ -103,7 +103,10 @@ async def _agreed(session: Session, own: Collection[Claim], by: By) -> None:
 async def run_typed(session: Session, origin: Origin, lines: Sequence[str], executed: Executed) -> None:
     """Execute typed lines in turn, without values and verbs of scripts. Raises the first failure."""
     with hearing(session) as heard:
-        execution, frame = Execution(session, heard, executed), Frame(None, replace(heard.of(origin), by=By.OPERATOR))
+        execution, frame = (
+            Execution(session, heard, executed),
+            ScriptFrame(None, replace(heard.of(origin), by=By.OPERATOR)),
+        )
         for count, text in enumerate(lines, 1):
             await execution.line(ScriptLine("", count, text), frame)
             if session.quitting:
@@ -151,11 +154,11 @@ async def play(
             playing = await execution.play(running, played, dict(played.values), times, fast, roles)
     rounds = counted(playing.rounds, "round") + ", ended by /quit" * session.quitting
     session.notify(f"macro {name}: {rounds} played in {session.now() - begun:.1f} s", outcome=True)
-    ended(Ending(name, playing.rounds))
+    ended(MacroEnding(name, playing.rounds))
     execution.check_verified(origin)
 
 
-SHOWN = 3
+MOST_SHOWN_PRINTS = 3
 """The number of printed lines that the report of a step shows."""
 
 
@@ -188,7 +191,7 @@ class _Aftermath:
         """Stop, report, execute `on_early_end`, read where the drives stand. A stop of everything cuts it short."""
         halts = await self._session.automations.end(self._origin)
         self._execution.is_over = True
-        found: tuple[Standing, ...] = ()
+        states: tuple[Standing, ...] = ()
         try:
             # Report the place and the last lines, and then the outcome of the stops.
             for text in self._story():
@@ -202,18 +205,18 @@ class _Aftermath:
             while self._left:
                 await self._lines_of(self._left[0])
                 self._left.pop(0)
-            found = await standings(
+            states = await standings(
                 self._session, self._drives(), self._session.units if self._session.scaled else None
             )
-            if found:
-                self._warn("; ".join(each.text for each in found))
+            if states:
+                self._warn("; ".join(standing.text for standing in states))
         except asyncio.CancelledError:
             if self.stopped:
                 self._drop()
             raise
         finally:
             outermost = self._execution.unfinished[-1].playing
-            ended(Ending(outermost.name, outermost.rounds, self.at, found))
+            ended(MacroEnding(outermost.name, outermost.rounds, self.at, states))
 
     @property
     def stopped(self) -> bool:
@@ -238,23 +241,23 @@ class _Aftermath:
 
     def _drives(self) -> list[Drive]:
         """The drives that its lines went to, without those of a bus that was closed."""
-        found: dict[Drive, None] = {}
+        drives: dict[Drive, None] = {}
         for bus, address in self._execution.addressed:
             with contextlib.suppress(Diagnostic, NoAnswer):
                 drive = self._session.drive(bus, address)
-                each = [drive] if drive in (listed := self._session.buses[bus].all_drives) else listed
-                found.update(dict.fromkeys(each))
-        return list(found)
+                reached = [drive] if drive in (listed := self._session.buses[bus].all_drives) else listed
+                drives.update(dict.fromkeys(reached))
+        return list(drives)
 
     # The lines after it
 
     def _drop(self) -> None:
-        for each in self._left:
-            if lines := [node.line.text for node in each.played.on_early_end]:
-                self._session.dropped.append(each.playing.name)
+        for left in self._left:
+            if lines := [node.line.text for node in left.played.on_early_end]:
+                self._session.dropped.append(left.playing.name)
                 hint = "type them if the machine needs them"
                 self._warn(
-                    f"macro {each.playing.name}: on_early_end is not executed after a stop: {' · '.join(lines)}; {hint}"
+                    f"macro {left.playing.name}: on_early_end is not executed after a stop: {' · '.join(lines)}; {hint}"
                 )
         self._left.clear()
 
@@ -284,12 +287,14 @@ class _Aftermath:
             self._warn(text)
 
 
-def _reported(result: Result) -> str:
+def _reported(result: LineResult) -> str:
     """A line of the report: what was sent, and what came back."""
     line = result.line
     place = f"step {line.step}" if line.step else line.where
     place += f", round {result.round}" if result.round > 1 else ""
-    shown = " | ".join(islice(result.printed, SHOWN)) + (" | ..." if len(result.printed) > SHOWN else "")
+    shown = " | ".join(islice(result.printed, MOST_SHOWN_PRINTS)) + (
+        " | ..." if len(result.printed) > MOST_SHOWN_PRINTS else ""
+    )
     failure = f"FAILED: {result.error}" if result.error not in ("", CUT) else result.error
     answers = "; ".join(filter(None, (shown, failure)))
     return f"  {place}: {result.sent}" + (f" -> {answers}" if answers else "")

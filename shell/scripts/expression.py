@@ -18,7 +18,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.shell.line_syntax import EVERYONE, split_target
 
 Value = int | float | str
-LARGEST = 10**15
+LARGEST_NUMBER = 10**15
 """The largest magnitude of a result. Whole numbers up to it are exact, and a loop cannot fill the memory with one."""
 _NUMBER = re.compile(r"[+-]?(\d{1,16}(\.\d{0,16})?|\.\d{1,16})", re.ASCII)
 
@@ -79,8 +79,8 @@ def calculated(sign: str, left: Value, right: Value) -> Value:
     if sign in "/%" and second == 0:
         raise Diagnostic(f"{written(first)} {sign} 0 has no result")
     result = ARITHMETIC[sign](first, second)
-    if not abs(result) <= LARGEST:
-        raise Diagnostic(f"{written(first)} {sign} {written(second)} is beyond {LARGEST:.0e}")
+    if not abs(result) <= LARGEST_NUMBER:
+        raise Diagnostic(f"{written(first)} {sign} {written(second)} is beyond {LARGEST_NUMBER:.0e}")
     return result
 
 
@@ -93,9 +93,9 @@ def compared(sign: str, left: Value, right: Value, within: Value = 0) -> bool:
     return equal == (sign == "==")
 
 
-DEEPEST = 20
+DEEPEST_NESTING = 20
 """The deepest nesting."""
-LONGEST = 200
+MOST_TOKENS = 200
 """The largest number of tokens."""
 
 
@@ -114,7 +114,7 @@ class Name:
 
 
 @dataclass(frozen=True)
-class Word:
+class DriveQuestion:
     """A question to a drive: a word of it, or with `line` a line of its language. `target` as after an `@`."""
 
     text: str
@@ -162,14 +162,14 @@ class Comparison:
     within: Expression = field(default_factory=lambda: Constant(0))
 
 
-Expression = Constant | Name | Word | Measured | Unary | Binary | Comparison
-Known = Mapping[Name | Word, Value]
+Expression = Constant | Name | DriveQuestion | Measured | Unary | Binary | Comparison
+Known = Mapping[Name | DriveQuestion, Value]
 """The values of an expression's names and words."""
 
 
-def unknowns(tree: Expression) -> Iterator[Name | Word]:
+def unknowns(tree: Expression) -> Iterator[Name | DriveQuestion]:
     """The names and words of an expression, from left to right."""
-    if isinstance(tree, Name | Word):
+    if isinstance(tree, Name | DriveQuestion):
         yield tree
     elif isinstance(tree, Unary):
         yield from unknowns(tree.operand)
@@ -185,7 +185,7 @@ def evaluate(tree: Expression, known: Known) -> Value:
     """Calculate an expression; a condition is 1 or 0. Raises Diagnostic."""
     if isinstance(tree, Constant):
         return tree.value
-    if isinstance(tree, Name | Word):
+    if isinstance(tree, Name | DriveQuestion):
         return known[tree]
     if isinstance(tree, Measured):
         hint = "as in P > {10 mm}, or P == {10 mm} +- {0.1 mm}"
@@ -204,12 +204,12 @@ def evaluate(tree: Expression, known: Known) -> Value:
 
 def parse(text: str, names: Container[str]) -> Expression:
     """Parse an expression; `names` are those that the script has set. Raises Diagnostic."""
-    return _Parser(text, names).whole()
+    return _ExpressionParser(text, names).whole()
 
 
 def parse_check(text: str, names: Container[str], *, lists: bool = False) -> Comparison:
     """Parse the one comparison of a check. `lists`: brackets hold a list, or nothing. Raises Diagnostic."""
-    tree = _Parser(text, names, lists).whole()
+    tree = _ExpressionParser(text, names, lists).whole()
     if not isinstance(tree, Comparison):
         raise Diagnostic(f"{text.strip()} is not one comparison", hint="valid: [@ADDR] EXPR OP EXPR [+- N]")
     return tree
@@ -239,10 +239,10 @@ _COMPARISON = 2
 
 
 def _tokens(text: str) -> list[_Token]:
-    found = [_token(match) for match in _TOKEN.finditer(text.rstrip())]
-    if len(found) > LONGEST:
-        raise Diagnostic(f"the expression has more than {LONGEST} parts", hint="calculate it in steps with /set")
-    return found
+    tokens = [_token(match) for match in _TOKEN.finditer(text.rstrip())]
+    if len(tokens) > MOST_TOKENS:
+        raise Diagnostic(f"the expression has more than {MOST_TOKENS} parts", hint="calculate it in steps with /set")
+    return tokens
 
 
 def _token(match: re.Match[str]) -> _Token:
@@ -258,7 +258,7 @@ def _token(match: re.Match[str]) -> _Token:
 _END = _Token("end", "")
 
 
-class _Parser:
+class _ExpressionParser:
     def __init__(self, text: str, names: Container[str], lists: bool = False) -> None:
         self._lists = lists
         self._text = text.strip()
@@ -307,8 +307,10 @@ class _Parser:
 
     def _operand(self) -> Expression:
         self._depth += 1
-        if self._depth > DEEPEST:
-            raise Diagnostic(f"the expression is nested deeper than {DEEPEST}", hint="calculate it in steps with /set")
+        if self._depth > DEEPEST_NESTING:
+            raise Diagnostic(
+                f"the expression is nested deeper than {DEEPEST_NESTING}", hint="calculate it in steps with /set"
+            )
         try:
             token = self._take()
             return self._signed(token) if token.kind == "sign" else self._value(token)
@@ -331,8 +333,10 @@ class _Parser:
     def _value(self, token: _Token) -> Expression:
         if token.kind == "number":
             value = value_of(token.text)
-            if isinstance(value, str) or value > LARGEST:
-                raise Diagnostic(f"{token.text} has too many digits", hint=f"valid: up to {LARGEST:.0e}, 16 places")
+            if isinstance(value, str) or value > LARGEST_NUMBER:
+                raise Diagnostic(
+                    f"{token.text} has too many digits", hint=f"valid: up to {LARGEST_NUMBER:.0e}, 16 places"
+                )
             return Constant(value)
         if token.kind == "text":
             return Constant(token.text[1:-1])
@@ -342,9 +346,11 @@ class _Parser:
         if token.kind == "quantity":
             return Measured(token.text)
         if token.kind == "line":
-            return Word(token.text[1:-1].strip() if self._lists else _line(token.text), self._target, line=True)
+            return DriveQuestion(
+                token.text[1:-1].strip() if self._lists else _line(token.text), self._target, line=True
+            )
         if token.kind == "word":
-            return Name(token.text) if token.text in self._names else Word(token.text, self._target)
+            return Name(token.text) if token.text in self._names else DriveQuestion(token.text, self._target)
         raise Diagnostic(f"a value is missing at the end of {self._text}" if self._text else "a value is missing")
 
 

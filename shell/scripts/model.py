@@ -42,7 +42,7 @@ class ScriptLine:
 
 
 @dataclass(frozen=True)
-class Step:
+class ScriptStep:
     """One line to execute."""
 
     line: ScriptLine
@@ -83,7 +83,7 @@ class CallMacro:
     fast: bool = False
 
 
-Node = Step | If | Repeat | CallFile | CallMacro
+Node = ScriptStep | If | Repeat | CallFile | CallMacro
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def lines_of(body: Sequence[Node]) -> Iterator[ScriptLine]:
 
 
 @dataclass(frozen=True)
-class Result:
+class LineResult:
     """The result of one line. `sent` is the line with its values; `bus` and `drive` are empty for a verb."""
 
     line: ScriptLine
@@ -172,12 +172,12 @@ class Result:
         return place | fields | where | time | error
 
 
-Executed = Callable[[Result], None]
+Executed = Callable[[LineResult], None]
 """Takes the result of each line as it ends."""
 
 
 @dataclass(frozen=True)
-class Ending:
+class MacroEnding:
     """The end of a macro."""
 
     macro: str
@@ -190,9 +190,11 @@ class Ending:
 
     def fact(self) -> dict[str, Any]:
         """The end as an object for programs."""
-        early = {"at": self.at, "drives": {each.name: each.fact for each in self.standings}} if self.at else {}
+        early = (
+            {"at": self.at, "drives": {standing.name: standing.fact for standing in self.standings}} if self.at else {}
+        )
         return {"macro": self.macro, "rounds": self.rounds} | early
 
 
-Ended = Callable[[Ending], None]
+Ended = Callable[[MacroEnding], None]
 """Takes the end of a macro."""

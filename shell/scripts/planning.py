@@ -23,7 +23,7 @@ RAW = {"": True, "on": True, "open": True, "off": False}
 """The words of `/raw` that begin or end raw mode."""
 
 
-class Values(dict[str, str]):
+class KnownValues(dict[str, str]):
     """Values of names; a name that is not known yet is 0."""
 
     def __missing__(self, name: str) -> str:
@@ -62,7 +62,7 @@ def macro_claims(workspace: Workspace, origin: Origin, played: MacroScript, role
 def script_claims(workspace: Workspace, origin: Origin, script: Script) -> set[Claim]:
     """The drives that a script moves, as far as its lines show it. Raises Diagnostic as `macro_claims` does."""
     planning = _Planning(workspace)
-    return {(drive.link, drive.address) for _, drive in planning.block(script.body, Values(script.values), origin)}
+    return {(drive.link, drive.address) for _, drive in planning.block(script.body, KnownValues(script.values), origin)}
 
 
 class _Planning:
@@ -77,7 +77,7 @@ class _Planning:
 
     def macro(self, played: MacroScript, origin: Origin) -> Iterator[tuple[ScriptLine, Drive]]:
         """The lines of a macro that can start a drive, each with that drive; then those of its end."""
-        values = Values(played.values)
+        values = KnownValues(played.values)
         yield from self.block(played.body, values, origin)
         for line, drive in self.block(played.on_early_end, values, origin):
             if not (played.macro.on_early_end_moves or only_ends(drive, _text_of(line, values))):
@@ -85,14 +85,14 @@ class _Planning:
                 raise Diagnostic(f"{drive.shown}: {line.text} can start motion", line.where, hint)
             yield line, drive
 
-    def block(self, body: Sequence[Node], values: Values, origin: Origin) -> Iterator[tuple[ScriptLine, Drive]]:
+    def block(self, body: Sequence[Node], values: KnownValues, origin: Origin) -> Iterator[tuple[ScriptLine, Drive]]:
         """The lines of a block that can start a drive, each with that drive."""
         for node in body:
             if isinstance(node, If | Repeat):
                 yield from self.block(node.body, values, origin)
                 yield from self.block(node.otherwise if isinstance(node, If) else (), values, origin)
             elif isinstance(node, CallFile):
-                yield from self.block(node.script.body, Values(node.script.values), origin)
+                yield from self.block(node.script.body, KnownValues(node.script.values), origin)
             elif isinstance(node, CallMacro):
                 given = macro_call(fill(node.line.text, values)).divided(node.played.macro)[1]
                 yield from self.macro(node.played, origin.cast(self._bound(origin, node, given)))
@@ -108,7 +108,7 @@ class _Planning:
                 return NO_ROLES
             raise Diagnostic(str(problem), node.line.where) from None
 
-    def _started(self, origin: Origin, line: ScriptLine, values: Values) -> Drive | None:
+    def _started(self, origin: Origin, line: ScriptLine, values: KnownValues) -> Drive | None:
         """The drive that a line can start; None: it starts none, or it is not known yet.
 
         Raises Diagnostic for a line that its drive never gets.
@@ -146,7 +146,7 @@ class _Planning:
         return drive if drive.starts(text) else None
 
 
-def _text_of(line: ScriptLine, values: Values) -> str:
+def _text_of(line: ScriptLine, values: KnownValues) -> str:
     """The text for the drive, with values."""
     parsed = parse(fill(line.text, values))
     return parsed.text if isinstance(parsed, DriveLine) else ""

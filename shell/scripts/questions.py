@@ -15,12 +15,12 @@ from multidrop.shell.scripts.expression import (
     Binary,
     Comparison,
     Constant,
+    DriveQuestion,
     Expression,
     Measured,
     Name,
     Unary,
     Value,
-    Word,
     unknowns,
     value_of,
 )
@@ -28,13 +28,13 @@ from multidrop.shell.session import Session
 from multidrop.shell.workspace import Workspace
 
 if TYPE_CHECKING:
-    from multidrop.shell.units import Compared
+    from multidrop.shell.units import ComparedQuantity
 
 
-class Place:
+class MacroSelection:
     """The selection of one macro, which no other selection changes."""
 
-    def __init__(self, workspace: Workspace, origin: Origin, caller: Place | None = None) -> None:
+    def __init__(self, workspace: Workspace, origin: Origin, caller: MacroSelection | None = None) -> None:
         """Take the selection of the macro that calls this one, else the present one. `origin`: that of its lines."""
         self._workspace, self._origin = workspace, origin
         self._at: tuple[str, str] = workspace.place if caller is None else caller._at
@@ -65,12 +65,12 @@ class Place:
             self._at = self._workspace.place
 
 
-Checks = dict[Word, "Compared"]
+Checks = dict[DriveQuestion, "ComparedQuantity"]
 """The questions with whose values quantities are compared."""
 
 
 async def converted(
-    session: Session, origin: Origin, tree: Expression, place: Place | None = None
+    session: Session, origin: Origin, tree: Expression, place: MacroSelection | None = None
 ) -> tuple[Expression, Checks]:
     """The expression with numbers of the drive in place of quantities. Raises Diagnostic."""
     if isinstance(tree, Unary):
@@ -82,16 +82,16 @@ async def converted(
         return replace(tree, left=left, right=right), checks | more
     if not isinstance(tree, Comparison):
         return tree, {}
-    word = next((each for each in (tree.left, tree.right) if isinstance(each, Word)), None)
-    found, checks = tree, Checks()
+    word = next((side for side in (tree.left, tree.right) if isinstance(side, DriveQuestion)), None)
+    tree_now, checks = tree, Checks()
     for part in ("left", "right", "within"):
-        each = getattr(tree, part)
-        if isinstance(each, Measured) and word is not None:
+        value = getattr(tree, part)
+        if isinstance(value, Measured) and word is not None:
             drive = drive_of(session, origin, word, place)
             question, within = _question(session, drive, word), part == "within"
-            checks[word] = compared = await session.units.condition(drive, question, each.text, within)
-            found = replace(found, **{part: Constant(compared.number)})  # type: ignore[arg-type]
-    return found, checks
+            checks[word] = compared = await session.units.condition(drive, question, value.text, within)
+            tree_now = replace(tree_now, **{part: Constant(compared.number)})  # type: ignore[arg-type]
+    return tree_now, checks
 
 
 async def known(
@@ -99,31 +99,37 @@ async def known(
     origin: Origin,
     tree: Expression,
     values: Mapping[str, str],
-    place: Place | None,
+    place: MacroSelection | None,
     checks: Checks,
-) -> dict[Name | Word, Value]:
+) -> dict[Name | DriveQuestion, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 
     Raises Diagnostic for a word that is not a question, DriveError where a drive refuses or prints no single value.
     """
-    found: dict[Name | Word, Value] = {}
-    for each in unknowns(tree):
-        if each not in found:
-            if isinstance(each, Name):
-                found[each] = value_of(values[each.name])
+    answers: dict[Name | DriveQuestion, Value] = {}
+    for unknown in unknowns(tree):
+        if unknown not in answers:
+            if isinstance(unknown, Name):
+                answers[unknown] = value_of(values[unknown.name])
             else:
-                found[each] = await ask(session, origin, each, place, checks[each].check if each in checks else None)
-    return found
+                answers[unknown] = await ask(
+                    session, origin, unknown, place, checks[unknown].check if unknown in checks else None
+                )
+    return answers
 
 
-def drive_of(workspace: Workspace, origin: Origin, word: Word, place: Place | None = None) -> Drive:
+def drive_of(workspace: Workspace, origin: Origin, word: DriveQuestion, place: MacroSelection | None = None) -> Drive:
     """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
     bus, address = origin.target(place.target(word.target) if place is not None else word.target)
     return workspace.drive(bus, address or None)
 
 
 async def ask(
-    session: Session, origin: Origin, word: Word, place: Place | None = None, check: Check | None = None
+    session: Session,
+    origin: Origin,
+    word: DriveQuestion,
+    place: MacroSelection | None = None,
+    check: Check | None = None,
 ) -> Value:
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
     drive = drive_of(session, origin, word, place)
@@ -137,7 +143,7 @@ async def ask(
     return value_of(printed[0])
 
 
-def _question(workspace: Workspace, drive: Drive, word: Word) -> str:
+def _question(workspace: Workspace, drive: Drive, word: DriveQuestion) -> str:
     name = workspace.display_name(drive)
     if drive.link.name in workspace.raw:
         raise Diagnostic("is in raw mode, where no drive is asked", drive.link.name, "/raw off ends it")

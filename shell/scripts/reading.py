@@ -17,17 +17,27 @@ from multidrop.base.comments import uncommented
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import bounded, bytes_of, lines_of, utf8, why
 from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
-from multidrop.macros.model import Parameter, plain, written
+from multidrop.macros.model import MacroParameter, plain, written
 from multidrop.macros.toml_format import in_text
 from multidrop.shell.line_syntax import ENDS, VerbLine, parse
-from multidrop.shell.operations.operation import Kind
+from multidrop.shell.operations.operation import VerbKind
 from multidrop.shell.operations.table import find, script_verb
 from multidrop.shell.scripts import words
-from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
-from multidrop.shell.scripts.use import Checking, chosen
+from multidrop.shell.scripts.model import (
+    CallFile,
+    CallMacro,
+    If,
+    MacroScript,
+    Node,
+    Repeat,
+    Script,
+    ScriptLine,
+    ScriptStep,
+)
+from multidrop.shell.scripts.use import LineCheck, chosen
 from multidrop.shell.session import BARE_WORDS, bare
 
-BLOCKS = (Kind.IF, Kind.COUNT, Kind.WHILE)
+BLOCKS = (VerbKind.IF, VerbKind.COUNT, VerbKind.WHILE)
 """What begins a block."""
 UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""
@@ -65,35 +75,35 @@ def _places(macro: Macro, macros: MacroStore | None) -> Callable[[str, int], tup
     return at
 
 
-def stand_in(parameter: Parameter) -> str:
+def stand_in(parameter: MacroParameter) -> str:
     """A valid value in place of one that is only known when the line is executed."""
     if parameter.choices:
         return parameter.choices[0]
     if parameter.kind == "text":
         return UNKNOWN
-    low, high = (0 if each is None else each for each in (parameter.low, parameter.high))
+    low, high = (0 if limit is None else limit for limit in (parameter.low, parameter.high))
     return written(low if low > 0 else min(0, high) if parameter.high is not None else 0)
 
 
 T = TypeVar("T")
 INPUT = "-"
 """The name of standard input."""
-DEEPEST = 50
+DEEPEST_BLOCKS = 50
 """The deepest nesting of blocks."""
-MOST = 1000
+MOST_CALLS = 1000
 """The largest number of calls that a check follows."""
 Names = Mapping[str, str | None]
 """The names with a value, and the value where it is known beforehand."""
 
 
-class Link(NamedTuple):
+class ReadFrom(NamedTuple):
     """A file or macro on the way to a line."""
 
     identity: str
     shown: str
 
 
-Chain = tuple[Link, ...]
+Chain = tuple[ReadFrom, ...]
 
 
 class WrongScript(Diagnostic):
@@ -110,7 +120,7 @@ def read_script(file: str, values: Mapping[str, str], macros: MacroStore | None 
     Raises WrongScript with every error, each with `file:line`; Diagnostic for a file that cannot be read, and for a
     value that no line uses.
     """
-    reader = _Reader(values, macros)
+    reader = _ScriptReader(values, macros)
     script = reader.read(file, values, ())
     _all_used(file, values, reader.used)
     return script
@@ -130,7 +140,7 @@ def read_macro(macro: Macro, given: Mapping[str, str], macros: MacroStore | None
     Raises WrongScript with every error, each with the macro and the step; Diagnostic for wrong values.
     """
     values = checked_values(macro, given)
-    return _Reader({}, macros).macro_script(macro, values, ())
+    return _ScriptReader({}, macros).macro_script(macro, values, ())
 
 
 def source(file: str) -> list[ScriptLine]:
@@ -151,7 +161,7 @@ def _standard_input() -> bytes:
         raise Diagnostic(f"cannot be read: {why(error)}", INPUT) from None
 
 
-class _Reader:
+class _ScriptReader:
     """Reads a script and what it calls; collects the errors of all of them."""
 
     def __init__(self, values: Mapping[str, str], macros: MacroStore | None) -> None:
@@ -165,7 +175,7 @@ class _Reader:
         """Read and check a script file. Raises WrongScript."""
         if self._too_many():
             return Script(file, (), self.values)
-        checker = _Checker(self, source(file), values, (*chain, Link(_identity(file), file)))
+        checker = _ScriptChecker(self, source(file), values, (*chain, ReadFrom(_identity(file), file)))
         body = checker.script()
         self.used |= checker.used
         if checker.problems:
@@ -177,10 +187,10 @@ class _Reader:
         """Check a macro. Raises WrongScript."""
         if self._too_many():
             return MacroScript(macro, (), (), {})
-        chain = (*chain, Link(f"macro {macro.name}", macro.name))
+        chain = (*chain, ReadFrom(f"macro {macro.name}", macro.name))
         steps, on_early_end = steps_of(macro, self.macros)
-        body = _Checker(self, steps, values, chain)
-        ending = _Checker(self, on_early_end, values, chain)
+        body = _ScriptChecker(self, steps, values, chain)
+        ending = _ScriptChecker(self, on_early_end, values, chain)
         checked = MacroScript(macro, body.script(), ending.script(), _stood_in(values))
         if problems := [*body.problems, *ending.problems]:
             raise WrongScript(problems)
@@ -189,9 +199,9 @@ class _Reader:
     def _too_many(self) -> bool:
         """Count a call. Raises Diagnostic once there are too many; True for those after it."""
         self._calls += 1
-        if self._calls == MOST:
-            raise Diagnostic(f"more than {MOST} calls", hint="call in a /repeat")
-        return self._calls > MOST
+        if self._calls == MOST_CALLS:
+            raise Diagnostic(f"more than {MOST_CALLS} calls", hint="call in a /repeat")
+        return self._calls > MOST_CALLS
 
     def macro(self, name: str) -> bool:
         try:
@@ -205,10 +215,10 @@ def _identity(file: str) -> str:
     return os.path.realpath(file) if file != INPUT else INPUT
 
 
-class _Checker:
+class _ScriptChecker:
     """Checks one file: its blocks, and each of its lines as far as that is possible beforehand."""
 
-    def __init__(self, reader: _Reader, lines: Sequence[ScriptLine], values: Names, chain: Chain) -> None:
+    def __init__(self, reader: _ScriptReader, lines: Sequence[ScriptLine], values: Names, chain: Chain) -> None:
         self.problems: list[Diagnostic] = []
         self._reader = reader
         self._lines: Iterator[ScriptLine] = iter(lines)
@@ -233,7 +243,7 @@ class _Checker:
         """The steps up to an `/else` or `/end`, and that line; None at the end of the file."""
         body: list[Node] = []
         for line in self._lines:
-            if _kind(line) is Kind.BETWEEN:
+            if _kind(line) is VerbKind.BETWEEN:
                 self._try(line, chosen)
                 return body, line
             body.append(self._node(line))
@@ -244,17 +254,19 @@ class _Checker:
         if kind in BLOCKS:
             self._try(line, partial(self._check, line))
             self._depth += 1
-            if self._depth > DEEPEST:
-                raise WrongScript([*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST}", line.where)])
-            node = self._if(line) if kind is Kind.IF else self._repeat(line)
+            if self._depth > DEEPEST_BLOCKS:
+                raise WrongScript(
+                    [*self.problems, Diagnostic(f"blocks are nested deeper than {DEEPEST_BLOCKS}", line.where)]
+                )
+            node = self._if(line) if kind is VerbKind.IF else self._repeat(line)
             self._depth -= 1
             return node
-        if kind is Kind.CALL:
-            return self._try(line, lambda text: self._call(line, text)) or Step(line)
+        if kind is VerbKind.CALL:
+            return self._try(line, lambda text: self._call(line, text)) or ScriptStep(line)
         if line.word == "/play":
-            return self._try(line, lambda text: self._play(line, text)) or Step(line)
+            return self._try(line, lambda text: self._play(line, text)) or ScriptStep(line)
         self._try(line, partial(self._check, line))
-        return Step(line)
+        return ScriptStep(line)
 
     def _if(self, line: ScriptLine) -> If:
         before = dict(self._names)
@@ -272,7 +284,7 @@ class _Checker:
         body, end = self._block()
         self._close(line, end)
         text = words.rest_of(line.text)
-        if not (_kind(line) is Kind.COUNT and text.isdecimal() and int(text) > 0):
+        if not (_kind(line) is VerbKind.COUNT and text.isdecimal() and int(text) > 0):
             self._names = before
         return Repeat(line, body)
 
@@ -287,10 +299,10 @@ class _Checker:
         """Check a filled line as far as that is possible without a drive."""
         word = line.word
         if script_verb(word) is not None:
-            found = chosen(text)
-            if (scripted := found.form.script) is not None and scripted.check is not None:
-                checking = Checking(word, self._names, not self._unknown(line.text))
-                scripted.check(checking, **found.values)
+            form = chosen(text)
+            if (scripted := form.form.script) is not None and scripted.check is not None:
+                checking = LineCheck(word, self._names, not self._unknown(line.text))
+                scripted.check(checking, **form.values)
         elif words.sets_outcome(text):
             find(word).check(words.rest_of(text))
             self._names[words.OUTCOME] = None
@@ -317,7 +329,7 @@ class _Checker:
             return self._play(line, text)
         if not is_file and os.sep not in target and "." not in target:
             raise Diagnostic(f"no file and no macro {target}", "/call", "paths are relative to the current folder")
-        self._check_chain(Link(_identity(target), target), "/call")
+        self._check_chain(ReadFrom(_identity(target), target), "/call")
         raw = words.call(line.text)[1]
         known: dict[str, str | None] = {n: None if self._unknown(raw.get(n, "")) else v for n, v in given.items()}
         return CallFile(line, self._reader.read(target, {**self._reader.values, **known}, self._chain))
@@ -329,17 +341,17 @@ class _Checker:
             raise Diagnostic("the macro must be known before the first line is sent", line.word)
         if self._reader.macros is None:
             raise Diagnostic(f"no macro {call.macro}", line.word)
-        self._check_chain(Link(f"macro {call.macro}", call.macro), line.word)
+        self._check_chain(ReadFrom(f"macro {call.macro}", call.macro), line.word)
         macro = self._reader.macros.load(call.macro)
         given, _ = call.divided(macro)
         unknown = {name for name in given if self._unknown(raw.given[name])}
-        stand_ins = {each.name: stand_in(each) for each in macro.parameters if each.name in unknown}
+        stand_ins = {parameter.name: stand_in(parameter) for parameter in macro.parameters if parameter.name in unknown}
         values = checked_values(macro, {**given, **stand_ins})
         names = {name: None if name in unknown else value for name, value in values.items()}
         played = self._reader.macro_script(macro, names, self._chain)
         return CallMacro(line, played, call.times, call.fast)
 
-    def _check_chain(self, link: Link, word: str) -> None:
+    def _check_chain(self, link: ReadFrom, word: str) -> None:
         """Refuse what is under way already."""
         if link.identity in [each.identity for each in self._chain]:
             way = " -> ".join([*(each.shown for each in self._chain), link.shown])
@@ -363,7 +375,7 @@ class _Checker:
         self.problems.append(Diagnostic(message, line.where))
 
 
-def _kind(line: ScriptLine) -> Kind | None:
+def _kind(line: ScriptLine) -> VerbKind | None:
     """What a verb of scripts is to the lines around it; None for any other line."""
     verb = script_verb(line.word)
     return verb.script.kind if verb is not None and verb.script is not None else None

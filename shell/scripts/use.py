@@ -12,8 +12,8 @@ from multidrop.shell.operations.verb import Chosen
 from multidrop.shell.origin import Origin
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
-from multidrop.shell.scripts.expression import Comparison, Expression, Name, Value, Word, evaluate
-from multidrop.shell.scripts.questions import Checks, Place, converted, known
+from multidrop.shell.scripts.expression import Comparison, DriveQuestion, Expression, Name, Value, evaluate
+from multidrop.shell.scripts.questions import Checks, MacroSelection, converted, known
 from multidrop.shell.session import Session
 
 
@@ -22,7 +22,7 @@ class CheckFailed(DriveError):
 
 
 @dataclass(frozen=True)
-class Checking:
+class LineCheck:
     """A line that is checked before anything is sent."""
 
     word: str
@@ -41,7 +41,7 @@ class Checking:
 
 
 @dataclass(frozen=True)
-class Use:
+class LineUse:
     """A line that is executed, with its values filled in."""
 
     session: Session
@@ -49,7 +49,7 @@ class Use:
     """What drives have printed, and the drive that the line is about."""
     names: MutableMapping[str, str]
     """The names of `/set`, with their values."""
-    place: Place | None
+    place: MacroSelection | None
     """The selection of a macro."""
     origin: Origin
     word: str
@@ -66,7 +66,7 @@ class Use:
         tree, checks = await converted(self.session, self.origin, tree, self.place)
         return evaluate(tree, await self.known(tree, checks))
 
-    async def known(self, tree: Expression, checks: Checks) -> Mapping[Name | Word, Value]:
+    async def known(self, tree: Expression, checks: Checks) -> Mapping[Name | DriveQuestion, Value]:
         """The values of the names and words of an expression."""
         return await known(self.session, self.origin, tree, self.names, self.place, checks)
 

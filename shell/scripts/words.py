@@ -20,7 +20,7 @@ T = TypeVar("T", bound=Expression)
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 OUTCOME = "outcome"
 """The name that a `/wait ended` sets."""
-MOST = 10**9
+MOST_REPETITIONS = 10**9
 """The largest number of repetitions."""
 
 
@@ -50,8 +50,8 @@ def check_name(name: str) -> None:
 
 def call(text: str) -> tuple[str, dict[str, str]]:
     """Parse `/call`: the file or macro, and the values that are given to it."""
-    found = script_verbs()["/call"].parsed(rest_of(text)).values
-    return found["target"], dict(found["values"])
+    values = script_verbs()["/call"].parsed(rest_of(text)).values
+    return values["target"], dict(values["values"])
 
 
 def macro_call(text: str) -> PlayCall:
@@ -64,8 +64,8 @@ def macro_call(text: str) -> PlayCall:
     chosen = verb.parsed(rest_of(text))
     if chosen.form.fixed:  # it ends macros
         raise verb.wrong()
-    found = chosen.values
-    return PlayCall(found["macro"], dict(found["values"]), found["times"], found["fast"])
+    values = chosen.values
+    return PlayCall(values["macro"], dict(values["values"]), values["times"], values["fast"])
 
 
 @dataclass(frozen=True)
@@ -86,22 +86,22 @@ class PlayCall:
 
 
 def repetitions(value: Value) -> int:
-    if isinstance(value, str) or value != int(value) or not 0 <= value <= MOST:
+    if isinstance(value, str) or value != int(value) or not 0 <= value <= MOST_REPETITIONS:
         verb = script_verbs()["/repeat"]
-        raise verb.wrong(f"no number of repetitions {quoted(value)}; valid: 0 to {MOST}")
+        raise verb.wrong(f"no number of repetitions {quoted(value)}; valid: 0 to {MOST_REPETITIONS}")
     return int(value)
 
 
 def _parsed(word: str, text: str, names: Collection[str], parsing: Callable[[str, Collection[str]], T]) -> T:
     try:
-        found = parsing(text, names)
+        result = parsing(text, names)
     except Diagnostic as problem:
         raise Diagnostic(problem.message, word, problem.hint) from None
-    for each in unknowns(found):
-        if isinstance(each, Name) and _is_word(each.name):
-            hint = f"write {{{each.name}}} for the value, or choose another name"
-            raise Diagnostic(f"{each.name} is a value of --set and a word of drives", word, hint)
-    return found
+    for unknown in unknowns(result):
+        if isinstance(unknown, Name) and _is_word(unknown.name):
+            hint = f"write {{{unknown.name}}} for the value, or choose another name"
+            raise Diagnostic(f"{unknown.name} is a value of --set and a word of drives", word, hint)
+    return result
 
 
 @cache

@@ -68,14 +68,14 @@ def left(state: Path, port: str) -> list[str]:
     def parse(mark: Any) -> tuple[int, str]:
         return int(mark["pid"]), str(mark["text"])
 
-    marks, found = _marks(state, port), []
+    marks, left_marks = _marks(state, port), []
     for path in sorted(marks.folder.glob("*.json")):
         mark = marks.find(path.name, parse)
         if mark is not None and not _runs(mark[0]):
             with contextlib.suppress(OSError):
                 path.unlink()
-                found.append(mark[1])
-    return found
+                left_marks.append(mark[1])
+    return left_marks
 
 
 def _marks(state: Path, port: str) -> Store:

@@ -40,7 +40,7 @@ MOST_REPLIED = 64
 RANGES = {"checksum": range(3), "em": range(4)}
 LINE = 128
 """The size of `NAME.line`, bytes: more than a line, then zeros."""
-MOST = 64
+MOST_OWED_ROWS = 64
 """The largest number of drives recorded for a port; the oldest are dropped."""
 LONGEST_NAME = 100
 PSEUDO_TERMINALS = "/dev/pts/"
@@ -67,7 +67,7 @@ class PortMemory:
             return
 
     def _parsed(self, kept: Any) -> tuple[tuple[Remembered, ...], int]:
-        rows = [_row(Remembered, each, party=bool, checksum=int, em=int) for each in kept["drives"]]
+        rows = [_row(Remembered, row, party=bool, checksum=int, em=int) for row in kept["drives"]]
         if any(row.party != bool(row.address) or len(row.address) > 1 for row in rows):
             raise ValueError(rows)
         return tuple(rows[-MOST_REPLIED:]), int(kept.get("baud", 0))
@@ -77,10 +77,10 @@ class PortMemory:
 
         A port has drives in party mode or one that is not, never both.
         """
-        new = [each for each in found.values() if each is not None]
-        kept = [each for each in self.drives if each.address not in found]
+        new = [remembered for remembered in found.values() if remembered is not None]
+        kept = [drive for drive in self.drives if drive.address not in found]
         if new:
-            kept = [each for each in kept if each.party == new[0].party]
+            kept = [remembered for remembered in kept if remembered.party == new[0].party]
         drives, baud = tuple(kept + new)[-MOST_REPLIED:], baud if new else self.baud
         if set(drives) != set(self.drives) or baud != self.baud:
             self.drives, self.baud = drives, baud
@@ -144,7 +144,7 @@ class PortState(Keeper):
             owed += [known.restore] if known.restore else []
             if tuple(owed) == self.owed:
                 return
-            self.owed = tuple(owed[-MOST:])
+            self.owed = tuple(owed[-MOST_OWED_ROWS:])
             try:
                 await asyncio.to_thread(self._save)
             except OSError as problem:
@@ -213,8 +213,8 @@ class PortState(Keeper):
                     os.lseek(line, 0, os.SEEK_SET)
             else:
                 fcntl.flock(line, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            found = os.read(line, LINE).rstrip(b"\0").decode("latin-1")
-            self.cut = "".join(each if each.isprintable() else "?" for each in found)
+            holder = os.read(line, LINE).rstrip(b"\0").decode("latin-1")
+            self.cut = "".join(character if character.isprintable() else "?" for character in holder)
             if not self.cut:
                 _write_at_start(line, b"\0" * LINE)
         except OSError:
@@ -227,7 +227,9 @@ class PortState(Keeper):
         try:
             self.owed = self._store.load(
                 path.name,
-                lambda found: tuple(_row(Owed, {"lines": "", **each}, em=int) for each in found["owed"])[-MOST:],
+                lambda found: tuple(_row(Owed, {"lines": "", **row}, em=int) for row in found["owed"])[
+                    -MOST_OWED_ROWS:
+                ],
             )
         except FileNotFoundError:
             return
@@ -255,9 +257,9 @@ def _prune(folder: Path, now: float) -> None:
         port = unquote(line.name.removesuffix(".line"))
         if not port.startswith("/dev/") or os.path.exists(port) or line.with_suffix(".json").exists():
             continue
-        found = line.lstat()
-        gone = port.startswith(PSEUDO_TERMINALS) or now - found.st_mtime > KEPT_FOR
-        if gone and stat.S_ISREG(found.st_mode):
+        facts = line.lstat()
+        gone = port.startswith(PSEUDO_TERMINALS) or now - facts.st_mtime > KEPT_FOR
+        if gone and stat.S_ISREG(facts.st_mode):
             _delete(line)
 
 

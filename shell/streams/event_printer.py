@@ -15,7 +15,7 @@ from multidrop.shell.streams.stdout import StatusLine, write
 
 _COLUMN = re.compile(r" *(?:\S(?:.*?\S)? {2,}(?=\S))?")
 """A label and the blanks after it, up to the text beside it; else the indent."""
-LEAST = 20
+LEAST_WIDTH = 20
 """The smallest width beside an indent; below it the indent is dropped."""
 
 
@@ -23,17 +23,17 @@ def laid_out(line: str, width: int) -> list[str]:
     """Break a line into rows of at most `width` cells; each row continues in the column of its text."""
     if len(line) <= width:
         return [line]
-    found = _COLUMN.match(line)
-    at = found.end() if found else 0
-    if width - at < LEAST:
-        at = min(len(line) - len(line.lstrip()), max(0, width - LEAST))
+    match = _COLUMN.match(line)
+    at = match.end() if match else 0
+    if width - at < LEAST_WIDTH:
+        at = min(len(line) - len(line.lstrip()), max(0, width - LEAST_WIDTH))
         if not line[:at].isspace():
             at = 0
     rows = textwrap.wrap(line[at:].lstrip(), max(1, width - at), break_on_hyphens=False) or [""]
     return [line[:at] + rows[0], *(" " * at + row for row in rows[1:])]
 
 
-class Printer:
+class EventPrinter:
     """Prints a session's events. Subscribe its `show`.
 
     `talkative`: print all notices and the failures of background lines; otherwise print warnings and outcomes only.

@@ -21,7 +21,7 @@ from functools import partial
 from typing import TextIO
 
 from multidrop.base.text import counted
-from multidrop.shell.threads import CHUNK, LIMIT, BoundedWriter, Loss
+from multidrop.shell.threads import CHUNK, QUEUE_BYTES, BoundedWriter, Loss
 
 if sys.platform == "win32":
     from multidrop.shell.console import writer as console_writer
@@ -37,7 +37,7 @@ as_json = False
 
 
 def descriptor_writer(
-    descriptor: int, notice: Callable[[Loss], bytes], failed: Callable[[OSError], None], limit: int = LIMIT
+    descriptor: int, notice: Callable[[Loss], bytes], failed: Callable[[OSError], None], limit: int = QUEUE_BYTES
 ) -> BoundedWriter:
     """Make the writer of a descriptor. `failed` is called, from its thread, once that can no longer be written."""
 
@@ -80,7 +80,7 @@ class LineStream(io.TextIOBase):
         return self
 
 
-class Outlet(LineStream):
+class OutputStream(LineStream):
     """A text stream over a writer. `errors`: it carries warnings."""
 
     def __init__(self, stream: TextIO, writer: BoundedWriter, errors: bool) -> None:
@@ -125,17 +125,17 @@ class Outlet(LineStream):
 class Streams:
     """The outlets in place of the standard streams."""
 
-    def __init__(self, outlets: list[Outlet]) -> None:
+    def __init__(self, outlets: list[OutputStream]) -> None:
         self.outlets = outlets
 
     async def ready(self) -> None:
         """Wait while the reader of a pipe or a file is behind; never for a terminal."""
         import asyncio  # only who has an event loop pays for it
 
-        while any(each.writer.behind and not each.terminal for each in self.outlets):
+        while any(outlet.writer.behind and not outlet.terminal for outlet in self.outlets):
             await asyncio.sleep(0.01)
 
-    async def finish(self, hurried: Callable[[], bool]) -> list[Outlet]:
+    async def finish(self, hurried: Callable[[], bool]) -> list[OutputStream]:
         """Wait until everything is written; give up and return the outlets that are not read.
 
         `hurried` returns whether the process must end now.
@@ -143,14 +143,14 @@ class Streams:
         import asyncio
 
         loop, late = asyncio.get_running_loop(), []
-        for each in self.outlets:
-            seen, since = each.writer.written, loop.time()
-            while not each.writer.idle:
-                if each.writer.written != seen:
-                    seen, since = each.writer.written, loop.time()
-                if loop.time() - since > (SHORT_TIMEOUT if each.terminal or hurried() else PIPE_TIMEOUT):
-                    each.writer.give_up()
-                    late.append(each)
+        for outlet in self.outlets:
+            seen, since = outlet.writer.written, loop.time()
+            while not outlet.writer.idle:
+                if outlet.writer.written != seen:
+                    seen, since = outlet.writer.written, loop.time()
+                if loop.time() - since > (SHORT_TIMEOUT if outlet.terminal or hurried() else PIPE_TIMEOUT):
+                    outlet.writer.give_up()
+                    late.append(outlet)
                     break
                 await asyncio.sleep(0.002)
         return late
@@ -164,7 +164,7 @@ def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
     stays unchanged.
     """
     before = sys.stdout, sys.stderr
-    made: dict[TextIO, Outlet] = {}
+    made: dict[TextIO, OutputStream] = {}
     errors: BoundedWriter | None = None
     for stream in (sys.stderr, sys.stdout):
         with contextlib.suppress(OSError, ValueError, AttributeError):
@@ -172,14 +172,14 @@ def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
                 writer = errors
             else:
                 writer = descriptor_writer(stream.fileno(), _notice(stream, errors), partial(failed, stream))
-            made[stream] = Outlet(stream, writer, stream is before[1])
+            made[stream] = OutputStream(stream, writer, stream is before[1])
             errors = errors or writer
     sys.stdout, sys.stderr = (made.get(stream, stream) for stream in before)
     try:
         yield Streams(list(made.values()))
     finally:
-        for each in made.values():
-            each.flush()
+        for outlet in made.values():
+            outlet.flush()
         sys.stdout, sys.stderr = before
 
 

@@ -23,12 +23,12 @@ from typing import TextIO
 from multidrop.base.text import visible
 from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE, exit_code
 from multidrop.shell.streams import output_streams
-from multidrop.shell.streams.output_streams import Outlet
+from multidrop.shell.streams.output_streams import OutputStream
 
 if sys.platform == "win32":
     from multidrop.shell.console import reader_gone
 
-LONGEST = 800
+LONGEST_PROBLEM_TEXT = 800
 """The longest message, in characters: it may quote a typed text of any length."""
 
 
@@ -40,9 +40,9 @@ def report(failure: BaseException) -> str:
 
 def shortened(text: str) -> str:
     """Shorten a long message in its middle, since its end says what to do."""
-    if len(text) <= LONGEST:
+    if len(text) <= LONGEST_PROBLEM_TEXT:
         return text
-    half = LONGEST // 2 - 20
+    half = LONGEST_PROBLEM_TEXT // 2 - 20
     return f"{text[:half]} ... ({len(text) - 2 * half} characters) ... {text[-half:]}"
 
 
@@ -237,7 +237,7 @@ class StatusLine:
 
     def show(self, text: str) -> None:
         """Show a text in place of the last one; a terminal that does not keep up is spared."""
-        if not sys.stderr.isatty() or (isinstance(sys.stderr, Outlet) and sys.stderr.writer.behind):
+        if not sys.stderr.isatty() or (isinstance(sys.stderr, OutputStream) and sys.stderr.writer.behind):
             return
         line = visible(text)[: max(1, get_terminal_size().columns - 1)]
         self._put(f"\r{line.ljust(self._shown)}")

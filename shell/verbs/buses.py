@@ -89,12 +89,12 @@ async def scan(call: Call, bus_name: BusName = "") -> None:
     bus = call.bus(bus_name)
     if call.by is By.OPERATOR and workspace.openings.searches(bus):
         return await workspace.openings.search(bus)
-    found = await scanning.extend(workspace, bus)
-    if found and workspace.of(bus).selected is None:
+    lines = await scanning.extend(workspace, bus)
+    if lines and workspace.of(bus).selected is None:
         workspace.identified(bus)
-    for address in found:
+    for address in lines:
         call.output(f"{bus.name}: {address} {model(bus.drives[address])}")
-    if not found:
+    if not lines:
         workspace.notify(f"{bus.name}: no other drive replies", outcome=True)
 
 
@@ -125,13 +125,13 @@ async def _show_in_units(call: Call, drive: Drive) -> None:
     if units is None or not units.shown or not units.axes(drive) or drive.programming:
         return
     await units.look(drive)
-    for each in await drive.motion():
-        place = units.words(drive, each.axis, each.position, Takes.PLACE)
-        speed = units.words(drive, each.axis, each.velocity, Takes.VELOCITY)
+    for motion in await drive.motion():
+        place = units.words(drive, motion.axis, motion.position, Takes.PLACE)
+        speed = units.words(drive, motion.axis, motion.velocity, Takes.VELOCITY)
         if place:
-            lost = "" if units.referenced(drive, each.axis) else ", not referenced"
+            lost = "" if units.referenced(drive, motion.axis) else ", not referenced"
             shown = ", ".join(filter(None, (part.strip(" ()") for part in (place, speed))))
-            call.output(f"{each.axis} in units: {shown}{lost}".lstrip())
+            call.output(f"{motion.axis} in units: {shown}{lost}".lstrip())
 
 
 def rename(call: Call, name: NewBusName, bus: BusName = "") -> None:

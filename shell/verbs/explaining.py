@@ -41,15 +41,15 @@ def overview() -> list[str]:
     lines: list[str] = []
     for title, names in groups().items():
         lines += ["", f"{title}:"] if lines else [f"{title}:"]
-        for each in map(VERBS.__getitem__, names):
-            if len(each.usage) > WIDTH:
-                lines.append(each.usage)
-            mark = "[screen] " * (each.fits in ON_SCREEN)
-            lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {mark}{each.lines[0]}")
+        for verb in map(VERBS.__getitem__, names):
+            if len(verb.usage) > WIDTH:
+                lines.append(verb.usage)
+            mark = "[screen] " * (verb.fits in ON_SCREEN)
+            lines.append(f"{verb.usage if len(verb.usage) <= WIDTH else '':<{WIDTH}}  {mark}{verb.lines[0]}")
     lines += ["", "In scripts only:"]
-    for each in script_verbs().values():
-        lines += [each.usage] if len(each.usage) > WIDTH else []
-        lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {each.help}")
+    for verb in script_verbs().values():
+        lines += [verb.usage] if len(verb.usage) > WIDTH else []
+        lines.append(f"{verb.usage if len(verb.usage) <= WIDTH else '':<{WIDTH}}  {verb.help}")
     return [*lines, "", "[screen]: only on the screen, which multidrop tui shows"]
 
 
@@ -66,9 +66,9 @@ def described(name: str, language: Language | None = None, product: str = "") ->
     stored = {key: lines for key, each in files if (lines := each.editing.describe(name, product))}
     also = f"/{name.lower()}"
     more = [f"also: the verb {also}; help {also} explains it"] * (also in VERBS or also in script_verbs())
-    for each in [language] if language else languages():
-        if each.knows(name):
-            return [*each.describe(name, product), *more]
+    for spoken in [language] if language else languages():
+        if spoken.knows(name):
+            return [*spoken.describe(name, product), *more]
     for key, lines in stored.items():
         if language is FAMILIES[key].language:
             return [*lines, *more]
@@ -84,7 +84,9 @@ def described(name: str, language: Language | None = None, product: str = "") ->
         ]
     if language is None and stored:
         return [*next(iter(stored.values()))]
-    if language and (others := [key for key, each in FAMILIES.items() if key in stored or each.language.knows(name)]):
+    if language and (
+        others := [key for key, family in FAMILIES.items() if key in stored or family.language.knows(name)]
+    ):
         raise Diagnostic(
             f"this drive has no command {name}", "/help", f"multidrop help {name} --dialect {others[0]} explains it"
         )

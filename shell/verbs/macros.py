@@ -63,13 +63,13 @@ def list_(macros: Macros) -> None:
     """Print a line for each macro; one that cannot be read is reported and does not hide the others."""
     from multidrop.macros.store import listed
 
-    found = listed(macros.store)
-    for line in found.lines:
+    listing = listed(macros.store)
+    for line in listing.lines:
         macros.row(line)
-    for line in (*found.warnings, *map(str, found.broken[:-1])):
+    for line in (*listing.warnings, *map(str, listing.broken[:-1])):
         macros.warn(line)
-    if found.broken:
-        raise found.broken[-1]
+    if listing.broken:
+        raise listing.broken[-1]
 
 
 def show(macros: Macros, macro: MacroName) -> None:
@@ -102,8 +102,8 @@ def set_key(macros: Macros, key: Key, macro: OnKey, *, page: Page = "1") -> None
 
     done, doubtful = macro_changes.set_key(macros.store, key, macro, page)
     macros.say(done)
-    for each in doubtful:
-        macros.warn(each)
+    for warning in doubtful:
+        macros.warn(warning)
 
 
 def import_(macros: Macros, file: Imported, *, force: InPlace = False) -> None:
@@ -171,7 +171,7 @@ async def play(call: Call, macro: MacroName, *values: NamedValue, times: Rounds 
     workspace = call.session
     if workspace.latched:
         raise Stopped(LATCHED)
-    if call.by is By.OPERATOR and any(each.name == macro for each in workspace.playing):
+    if call.by is By.OPERATOR and any(playing.name == macro for playing in workspace.playing):
         raise Diagnostic(f"macro {macro} is playing", "/play", f"/play stop {macro} ends it")
     loaded = workspace.macros.load(macro)
     if workspace.front.unsaved is not None:
@@ -184,11 +184,11 @@ async def play(call: Call, macro: MacroName, *values: NamedValue, times: Rounds 
 
 
 def stop_playing(call: Call, macro: MacroName = "") -> None:
-    found = [each for each in call.session.playing if macro in ("", each.name)]
-    if not found:
+    playing = [macro_run for macro_run in call.session.playing if macro in ("", macro_run.name)]
+    if not playing:
         raise Diagnostic(f"macro {macro} does not play" if macro else "no macro plays", "/play stop")
-    for each in found:
-        each.end()
+    for stopped in playing:
+        stopped.end()
 
 
 def play_opened(

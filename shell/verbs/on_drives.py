@@ -117,7 +117,7 @@ class OfUrl(OnDrives[int]):
 def given_options(call: Call) -> list[str]:
     """The options of a line as words, in the order of the usage."""
     values = call.chosen.values
-    given = [(each.names[-1], values[each.name]) for each in call.chosen.form.options if values[each.name]]
+    given = [(option.names[-1], values[option.name]) for option in call.chosen.form.options if values[option.name]]
     words: list[str] = []
     for name, value in given:
         words += [name] if value is True else [name, value if isinstance(value, str) else ",".join(sorted(value))]

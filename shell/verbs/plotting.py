@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def say(call: Call) -> None:
     """Say what is plotted."""
     session = call.session
-    for each in session.plots:
-        call.output(f"plotting to {each.where}, {each.rate}")
+    for plot in session.plots:
+        call.output(f"plotting to {plot.where}, {plot.rate}")
     if session.plotted:
-        call.output(f"plotting on the screen: {' '.join(each.text for each in session.plotted)}")
+        call.output(f"plotting on the screen: {' '.join(series.text for series in session.plotted)}")
     elif not session.plots:
         call.output("plotting: nothing")
 
@@ -32,8 +32,8 @@ async def end(session: Session) -> None:
     if session.plotted:
         session.plotted = ()
         session.changed()
-    for each in list(session.plots):
-        session.notify(await each.end())
+    for plot in list(session.plots):
+        session.notify(await plot.end())
 
 
 async def plot(call: Call, texts: Sequence[str]) -> None:

@@ -35,8 +35,8 @@ async def check(call: Call, file: str, personality: str) -> None:
     call.warn_of_editor(file)
     reported = {own: (selected.version, selected.state.part)} if selected else {}
     checked = await asyncio.to_thread(examine, file, product, reported=reported)
-    for each in checked.problems:
-        call.session.notify(each.line_for(file), warning=True)
+    for problem in checked.problems:
+        call.session.notify(problem.line_for(file), warning=True)
     if not checked.right:
         count = len(errors(checked.problems))
         raise Inexpressible(f"{file}: {counted(count, 'error')} for {product}")

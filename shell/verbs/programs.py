@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.shell.operations.argument_types import (
     Address,
-    Checking,
+    CheckOptions,
     Downloading,
     Drives,
     FileName,
@@ -53,7 +53,7 @@ async def check(call: Call, file: FileName, personality: Personality = "") -> No
     await program_lines.check(call, file, personality)
 
 
-def check_files(files: tuple[ProgramFile, ...], *, how: Checking) -> int:
+def check_files(files: tuple[ProgramFile, ...], *, how: CheckOptions) -> int:
     from multidrop.shell.batch import program_runs
 
     return program_runs.check(files, how)

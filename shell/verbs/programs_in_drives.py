@@ -49,8 +49,8 @@ def diff(file: str, drives: OfUrl, as_json: bool) -> int:
 
     async def compare(session: Session, origin: Origin, drive: Drive) -> None:
         nonlocal differ
-        name, found = session.display_name(drive), await transfers.differences(session, drive, file, text)
-        for row in found:
+        name, differences = session.display_name(drive), await transfers.differences(session, drive, file, text)
+        for row in differences:
             facts = {
                 "drive": address_of(session, drive),
                 "line": row.number or None,
@@ -59,8 +59,8 @@ def diff(file: str, drives: OfUrl, as_json: bool) -> int:
                 "there": row.there,
             }
             session.output(json.dumps(facts) if as_json else transfers.in_words(file, row, name), origin=origin)
-        differ = differ or bool(found)
-        if not found:
+        differ = differ or bool(differences)
+        if not differences:
             session.notify(f"{name} holds {file}", outcome=True)
 
     return drives.each(compare, unsolicited=False) or (DIFFERS if differ else 0)
@@ -84,14 +84,14 @@ def download(drives: OnDrives[R_co], file: str, wanted: Downloading) -> R_co:
     text, later = drives.program_text(file), drives.several
 
     async def put(session: Session, origin: Origin) -> None:
-        found = targets(session, origin, drives.target, "programs")
+        reached = targets(session, origin, drives.target, "programs")
         kept = await asyncio.to_thread(program_text_of, file) if text is None and later else text
 
         async def send(drive: Drive) -> None:
             await transfers.download(session, origin, drive, file, wanted, kept, later=later)
 
-        await each(session, found, send)
+        await each(session, reached, send)
         if later and wanted.run:
-            await each(session, found, lambda drive: transfers.start(session, origin, drive, file, wanted, kept))
+            await each(session, reached, lambda drive: transfers.start(session, origin, drive, file, wanted, kept))
 
     return drives.run(put, unsolicited=True)

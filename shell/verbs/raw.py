@@ -45,17 +45,17 @@ Bytes = Annotated[str, Argument(metavar="BYTE ...", rest=True)]
 def in_raw_mode(call: Call) -> RawLine:
     """The selected bus in raw mode. Raises Diagnostic for any other."""
     bus = call.session.bus()
-    found = call.session.raw.get(bus.name)
-    if found is None:
+    raw = call.session.raw.get(bus.name)
+    if raw is None:
         raise Diagnostic(f"{bus.name} is not in raw mode", call.verb.name, "/raw on begins it")
-    return found
+    return raw
 
 
-def forms() -> Mapping[str, raw.Form]:
+def forms() -> Mapping[str, raw.ByteForm]:
     """The forms in which bytes are shown, by their words."""
     from multidrop.shell import raw
 
-    return {form.value[0]: form for form in raw.Form}
+    return {form.value[0]: form for form in raw.ByteForm}
 
 
 async def begin(call: Call) -> None:

@@ -27,9 +27,11 @@ def apply_each(drives: OfUrl, file: str, source: str, wanted: Restoring) -> int:
         if not drives.target and len(there) > 1:
             names = ", ".join(session.display_name(drive) for drive in there)
             raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
-        found = targets(session, origin, drives.target)
+        reached = targets(session, origin, drives.target)
         # All are found in the file before the first one is written to.
-        specs = {drive: replacement.chosen(cell, file, drive, source, drives.several) for drive in found}
-        await each(session, found, lambda drive: replacement.apply(session, origin, drive, file, specs[drive], wanted))
+        specs = {drive: replacement.chosen(cell, file, drive, source, drives.several) for drive in reached}
+        await each(
+            session, reached, lambda drive: replacement.apply(session, origin, drive, file, specs[drive], wanted)
+        )
 
     return drives.run(put, unsolicited=True)

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from multidrop.shell.operations import arguments
 from multidrop.shell.operations.argument_types import NamedValue
-from multidrop.shell.operations.operation import Kind, Operation, Scripted
+from multidrop.shell.operations.operation import Operation, Scripted, VerbKind
 from multidrop.shell.operations.parameter import Argument, Listed
 from multidrop.shell.verbs.waiting import Seconds
 
 if TYPE_CHECKING:
-    from multidrop.shell.scripts.use import Checking, Use
+    from multidrop.shell.scripts.use import LineCheck, LineUse
 
-SHOWN = 3
+MOST_SHOWN_PRINTS = 3
 """The number of printed lines that a failed `/expect` shows."""
 LISTENS = 1.0
 """The default time in which `/expect` looks for its text, s."""
@@ -27,24 +27,24 @@ Text = Annotated[str, Argument(metavar="TEXT", rest=True)]
 Called = Annotated[str, Argument(metavar="FILE|MACRO", listed=(Listed.FILE, Listed.MACRO))]
 
 
-def check_expression(checking: Checking, expression: Expression) -> None:
+def check_expression(checking: LineCheck, expression: Expression) -> None:
     checking.expression(expression)
 
 
-def check_comparison(checking: Checking, check: Check) -> None:
+def check_comparison(checking: LineCheck, check: Check) -> None:
     checking.comparison(check)
 
 
 # Values
 
 
-async def set_(use: Use, name: Name, expression: Expression) -> None:
+async def set_(use: LineUse, name: Name, expression: Expression) -> None:
     from multidrop.shell.scripts.expression import written
 
     use.names[name] = written(await use.value(expression))
 
 
-def check_set(checking: Checking, name: Name, expression: Expression) -> None:
+def check_set(checking: LineCheck, name: Name, expression: Expression) -> None:
     from multidrop.shell.scripts.words import check_name
 
     check_name(name)
@@ -52,30 +52,30 @@ def check_set(checking: Checking, name: Name, expression: Expression) -> None:
     checking.names[name] = None
 
 
-def print_(use: Use, text: Text = "") -> None:
+def print_(use: LineUse, text: Text = "") -> None:
     use.session.output(text, origin=use.origin)
 
 
 # Blocks
 
 
-async def holds(use: Use, expression: Expression) -> bool:
+async def holds(use: LineUse, expression: Expression) -> bool:
     from multidrop.shell.scripts.expression import number
 
     return bool(number(await use.value(expression)))
 
 
-async def holds_not(use: Use, expression: Expression) -> bool:
+async def holds_not(use: LineUse, expression: Expression) -> bool:
     return not await holds(use, expression)
 
 
-async def rounds(use: Use, expression: Count) -> int:
+async def rounds(use: LineUse, expression: Count) -> int:
     from multidrop.shell.scripts.words import repetitions
 
     return repetitions(await use.value(expression))
 
 
-def check_rounds(checking: Checking, expression: Count) -> None:
+def check_rounds(checking: LineCheck, expression: Count) -> None:
     """Also the number, where that is known beforehand."""
     from multidrop.shell.scripts.expression import evaluate, unknowns
     from multidrop.shell.scripts.words import repetitions
@@ -85,31 +85,31 @@ def check_rounds(checking: Checking, expression: Count) -> None:
         repetitions(evaluate(tree, {}))
 
 
-def between(use: Use) -> None:
+def between(use: LineUse) -> None:
     """Divide or end a block."""
 
 
-def call(use: Use, target: Called, *values: NamedValue) -> None:
+def call(use: LineUse, target: Called, *values: NamedValue) -> None:
     """Stand for the lines of a file or a macro, which were read when the script was checked."""
 
 
 # Checks
 
 
-async def assert_(use: Use, check: Check) -> None:
+async def assert_(use: LineUse, check: Check) -> None:
     from multidrop.shell.scripts.checks import compare
 
     await compare(use, check)
 
 
-async def expect(use: Use, text: Wanted, seconds: Seconds = LISTENS) -> None:
+async def expect(use: LineUse, text: Wanted, seconds: Seconds = LISTENS) -> None:
     from multidrop.shell import waits
     from multidrop.shell.scripts.expression import quoted
     from multidrop.shell.scripts.use import CheckFailed
 
     heard = use.heard
     if not await waits.listened(use.session, use.origin, partial(heard.finds, text), seconds):
-        seen = ", ".join(map(quoted, heard.last(SHOWN))) or "nothing"
+        seen = ", ".join(map(quoted, heard.last(MOST_SHOWN_PRINTS))) or "nothing"
         raise CheckFailed(f'{use.text}: wanted "{text}" within {seconds:g} s, seen {seen}')
 
 
@@ -124,37 +124,37 @@ OPERATIONS = (
     Operation(
         holds,
         verb="/if",
-        script=CONDITION(Kind.IF),
+        script=CONDITION(VerbKind.IF),
         help="executes the lines up to /else or /end if the expression holds",
     ),
     Operation(
         between,
         verb="/else",
-        script=Scripted(Kind.BETWEEN),
+        script=Scripted(VerbKind.BETWEEN),
         help="begins the lines that are executed if the expression of /if does not hold",
     ),
     Operation(
         between,
         verb="/end",
-        script=Scripted(Kind.BETWEEN),
+        script=Scripted(VerbKind.BETWEEN),
         help="ends a block of /if, /repeat, /while or /until",
     ),
     Operation(
         rounds,
         verb="/repeat",
-        script=Scripted(Kind.COUNT, check_rounds, bare=True, steers=True),
+        script=Scripted(VerbKind.COUNT, check_rounds, bare=True, steers=True),
         help="executes the lines up to /end N times",
     ),
     Operation(
         holds,
         verb="/while",
-        script=CONDITION(Kind.WHILE),
+        script=CONDITION(VerbKind.WHILE),
         help="executes the lines up to /end while the expression holds; it is asked before each round",
     ),
     Operation(
         holds_not,
         verb="/until",
-        script=CONDITION(Kind.WHILE),
+        script=CONDITION(VerbKind.WHILE),
         help="executes the lines up to /end until the expression holds; it is asked before each round",
     ),
     Operation(
@@ -186,7 +186,7 @@ OPERATIONS = (
     Operation(
         call,
         verb="/call",
-        script=Scripted(Kind.CALL),
+        script=Scripted(VerbKind.CALL),
         help="executes another script, or plays a macro, with these values",
     ),
 )

@@ -126,10 +126,10 @@ async def tour(call: Call) -> None:
 
 def _transcripts(call: Call) -> Transcripts:
     """The transcripts of the screen. Raises Diagnostic where there is none."""
-    found = call.session.front.transcripts
-    if found is None:
+    transcripts = call.session.front.transcripts
+    if transcripts is None:
         raise Diagnostic("only the screen has a transcript", call.verb.name, "multidrop tui opens it")
-    return found
+    return transcripts
 
 
 async def times(call: Call, form: Times = "") -> None:

@@ -73,7 +73,7 @@ def params_recorded(call: Call) -> str:
     import shlex
 
     form, values = call.chosen
-    names = [values[each.name] for each in form.places if each.name != "addr"]
+    names = [values[place.name] for place in form.places if place.name != "addr"]
     target = values["addr"] or call.session.qualified_address(call.drive())
     words = (form.name, *form.fixed, *names, *filter(None, [target]), *given_options(call))
     return " ".join(map(shlex.quote, words))

@@ -24,12 +24,12 @@ PerTurn = Annotated[str, Argument(metavar="UNIT/turn|UNIT/step", read=arguments.
 
 def list_(call: Call) -> None:
     session = call.session
-    found = [
+    axes = [
         (drive, axis) for bus in session.buses.values() for drive in bus.drives.values() for axis in _axes(call, drive)
     ]
-    for drive, axis in found:
+    for drive, axis in axes:
         call.output(_described(call, drive, axis))
-    if not found:
+    if not axes:
         session.notify("no axis has a scale: /units ADDR 5 mm/turn gives it one", outcome=True)
 
 
@@ -74,9 +74,9 @@ async def _give(call: Call, drive: Drive, axis: str, text: str) -> None:
             drive.state.reference_lost([axis])
     units.set(drive, axis, given)
     await units.confirm(drive)
-    found = units.of(drive, axis)
-    if found is not None and found.measure is None:
-        raise Diagnostic(found.problem, "/units")
+    scaled = units.of(drive, axis)
+    if scaled is not None and scaled.measure is None:
+        raise Diagnostic(scaled.problem, "/units")
 
 
 def _axes(call: Call, drive: Drive) -> list[str]:

@@ -11,7 +11,7 @@ from multidrop.shell.operations.parameter import Argument, Listed
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Call
-    from multidrop.shell.waits import Condition
+    from multidrop.shell.waits import WaitCondition
 
 _TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
 _VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*(?:\{[^{}]*\}|\S+))(?:\s+(?P<seconds>\S+))?")
@@ -27,7 +27,7 @@ class TextWait(NamedTuple):
 class ValueWait(NamedTuple):
     """A value that a drive reports, and the seconds in which it does."""
 
-    value: Condition
+    value: WaitCondition
     seconds: float | None
 
 
@@ -83,7 +83,7 @@ async def wait(call: Call, state: Rest, seconds: Seconds | None = None) -> None:
     from multidrop.dialects.motions import Outcome
     from multidrop.shell import waits
 
-    limit = waits.LIMIT if seconds is None else seconds
+    limit = waits.WAIT_TIMEOUT if seconds is None else seconds
     watch = await waits.wait(call.session, call.origin, limit, idle=state == "idle", ended=state == "ended")
     if state != "ended":
         return
@@ -98,7 +98,7 @@ async def wait(call: Call, state: Rest, seconds: Seconds | None = None) -> None:
 async def wait_value(call: Call, wanted: Value) -> None:
     from multidrop.shell import waits
 
-    value, limit = wanted.value, waits.LIMIT if wanted.seconds is None else wanted.seconds
+    value, limit = wanted.value, waits.WAIT_TIMEOUT if wanted.seconds is None else wanted.seconds
     drive, units = call.drive(value.target), call.session.units if value.quantity else None
     await waits.wait_value(call.session, call.origin, drive, value, limit, units)
 
@@ -107,7 +107,7 @@ async def wait_text(call: Call, wanted: Text) -> None:
     from multidrop.shell import waits
 
     await waits.wait_text(
-        call.session, call.origin, wanted.text, waits.LIMIT if wanted.seconds is None else wanted.seconds
+        call.session, call.origin, wanted.text, waits.WAIT_TIMEOUT if wanted.seconds is None else wanted.seconds
     )
 
 

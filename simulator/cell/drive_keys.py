@@ -20,7 +20,7 @@ from multidrop.simulator.cell.spec import Identity, Scalar, Value, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted
 
 PROGRAM_TEXT = "program_text"
-LONGEST = 60
+LONGEST_TEXT_VALUE = 60
 """Characters of a text of `identity`."""
 INT32 = 2**31
 Check = Callable[[Table, str, Value], None]
@@ -88,20 +88,20 @@ def read_settings(table: Table, check: Check, spelled: Callable[[str], str] = st
 
     A list of texts, or of lists of numbers, gives several lines.
     """
-    found: dict[str, Value] = {}
+    settings: dict[str, Value] = {}
     for word, value in table.values.items():
         name = spelled(word)
-        if name in found:
+        if name in settings:
             raise table.wrong(quoted(word), "is given twice")
         if not isinstance(value, list):
-            found[name] = _scalar(table, word, value)
+            settings[name] = _scalar(table, word, value)
         elif not value:
             raise _wrong_shape(table, word)
         else:
-            rows = (each if isinstance(each, list) else [each] for each in value)
-            found[name] = tuple(",".join(str(_scalar(table, word, each)) for each in row) for row in rows)
-        check(table, word, found[name])
-    return MappingProxyType(found)
+            rows = (row if isinstance(row, list) else [row] for row in value)
+            settings[name] = tuple(",".join(str(_scalar(table, word, each)) for each in row) for row in rows)
+        check(table, word, settings[name])
+    return MappingProxyType(settings)
 
 
 def _scalar(table: Table, word: str, value: Any) -> Scalar:
@@ -124,8 +124,10 @@ def read_identity(drive: Table, texts: Collection[str], counters: Mapping[str, i
     given: dict[str, str] = {}
     for key in texts:
         given[key] = value = table.text(key, "")
-        if len(value) > LONGEST or not (value.isascii() and value.isprintable()):
-            raise table.wrong(key, f"cannot be {quoted(value)}", f"valid: up to {LONGEST} printable ASCII characters")
+        if len(value) > LONGEST_TEXT_VALUE or not (value.isascii() and value.isprintable()):
+            raise table.wrong(
+                key, f"cannot be {quoted(value)}", f"valid: up to {LONGEST_TEXT_VALUE} printable ASCII characters"
+            )
     counts = {key: _counts(table, key, counters[key]) for key in counters if key in table.values}
     return Identity(**given, counters=MappingProxyType(counts))
 
@@ -137,37 +139,37 @@ def _counts(table: Table, key: str, axes: int) -> tuple[int, ...]:
     rows = table.values[key]
     if not isinstance(rows, list) or len(rows) != axes:
         raise table.wrong(key, f"must be a list of {axes} whole numbers, one for each axis")
-    return tuple(Table({key: each}, table.where).integer(key, 0, -INT32, INT32 - 1) for each in rows)
+    return tuple(Table({key: row}, table.where).integer(key, 0, -INT32, INT32 - 1) for row in rows)
 
 
 def read_variables(drive: Table, valid: Callable[[str], bool], hint: str) -> Mapping[str, int]:
     """Read `variables`: whole numbers by name."""
     table = drive.table("variables", "[bus.drive.variables]")
-    found: dict[str, int] = {}
+    variables: dict[str, int] = {}
     for word in table.values:
         name = word.upper()
         if not valid(name):
             raise table.wrong(quoted(word), "is not the name of a variable", hint)
-        if name in found:
+        if name in variables:
             raise table.wrong(quoted(word), "is given twice")
-        found[name] = table.integer(word, 0, -INT32, INT32 - 1)
-    return MappingProxyType(found)
+        variables[name] = table.integer(word, 0, -INT32, INT32 - 1)
+    return MappingProxyType(variables)
 
 
 def read_units(table: Table, axes: Sequence[str] = ("",)) -> Mapping[str, Scale]:
     """Read `units`: the scale of the first axis, or a table with those of several, by axis."""
     given = table.values.get("units")
     by_axis = given if isinstance(given, dict) and "scale" not in given else {axes[0]: given}
-    found: dict[str, Scale] = {}
-    for axis, each in by_axis.items() if given is not None else ():
+    scales: dict[str, Scale] = {}
+    for axis, keys_of_axis in by_axis.items() if given is not None else ():
         if axis not in axes:
             hint = f"valid: {', '.join(axes)}" if axes[0] else 'as in units = "5 mm/turn"'
             raise Diagnostic(f"units: no axis {quoted(axis)}", table.at_line("units"), hint)
         try:
-            found[axis] = scale(each, table.source.own_units)
+            scales[axis] = scale(keys_of_axis, table.source.own_units)
         except Diagnostic as problem:
             raise Diagnostic(f"units: {problem.message}", table.at_line("units"), problem.hint) from None
-    return MappingProxyType(found)
+    return MappingProxyType(scales)
 
 
 @dataclass(frozen=True)
@@ -192,19 +194,19 @@ def _in_steps(table: Table, axis: AxisScale) -> Table:
     for key in POSITIONS:
         several = isinstance(values.get(key), list)
         places = values[key] if several else [values.get(key)]
-        if not any(isinstance(each, str) for each in places):
+        if not any(isinstance(place, str) for place in places):
             continue
         try:
             own = table.source.own_units
-            read = [quantity(each, own) if isinstance(each, str) else each for each in places]
+            read = [quantity(place, own) if isinstance(place, str) else place for place in places]
             if given is None:
                 raise Diagnostic("the drive has no scale", "", 'add units = "5 mm/turn" to its table')
             by_step = replace(given, value=given.value / axis.count) if given.of == STEP else given
             measure = Measure(by_step, Basis(turn=axis.turn, missing=axis.missing))
-            steps = [measure.steps(each) if isinstance(each, Quantity) else each for each in read]
+            steps = [measure.steps(value) if isinstance(value, Quantity) else value for value in read]
         except Diagnostic as problem:
             raise Diagnostic(f"{key}: {problem.message}", table.at_line(key), problem.hint) from None
-        if several and given.value < 0 and all(isinstance(each, str) for each in places):
+        if several and given.value < 0 and all(isinstance(place, str) for place in places):
             steps.reverse()
         values[key] = steps if several else steps[0]
     return replace(table, values=values)

@@ -44,4 +44,4 @@ def kinds() -> Iterator[EndpointKind]:
 
 def kind_of(scheme: str) -> EndpointKind | None:
     """Find the kind of a scheme; None: no feature adds it. Raises Diagnostic where its feature is not there."""
-    return next((each for each in registry.answering(EndpointKind, f"{scheme}:") if each.scheme == scheme), None)
+    return next((kind for kind in registry.answering(EndpointKind, f"{scheme}:") if kind.scheme == scheme), None)

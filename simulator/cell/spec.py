@@ -101,8 +101,8 @@ class DriveSpec:
     def assignments(self) -> Iterator[tuple[str, str]]:
         """Yield `set` as pairs of name and value, in order; `IS = ["1,1,0", "2,2,0"]` gives two pairs."""
         for name, value in self.set.items():
-            for each in value if isinstance(value, tuple) else (value,):
-                yield name, str(each)
+            for part in value if isinstance(value, tuple) else (value,):
+                yield name, str(part)
 
 
 @dataclass(frozen=True)

@@ -122,14 +122,14 @@ class Table:
             return self.position(key)
         if len(value) != 2:
             raise self.wrong(key, "must be one position or two, as in [-2000, 0]")
-        low, high = (self._number(key, each, *PLACES) for each in value)
+        low, high = (self._number(key, edge, *PLACES) for edge in value)
         if low >= high:
             raise self.wrong(key, f"must go up, not from {low:g} to {high:g}")
         return low, high
 
     def texts(self, key: str) -> tuple[str, ...]:
         values = self._list(key)
-        if not all(isinstance(each, str) for each in values):
+        if not all(isinstance(value, str) for value in values):
             raise self.wrong(key, 'must be a list of texts, as in ["pty:", "tcp://127.0.0.1:0"]')
         return tuple(values)
 
@@ -138,7 +138,7 @@ class Table:
         values = self._list(key, default)
         if len(values) != 2:
             raise self.wrong(key, "must be two numbers, as in [0.001, 0.02]")
-        low, high = (self._number(key, each, 0.0, 3600.0) for each in values)
+        low, high = (self._number(key, value, 0.0, 3600.0) for value in values)
         if low > high:
             raise self.wrong(key, f"goes down, from {low:g} to {high:g}")
         return low, high
@@ -150,7 +150,7 @@ class Table:
             if not isinstance(row, list) or len(row) != len(columns):
                 raise self.wrong(key, f"must be a list of {shape}: row {number} is {shown(row)}")
             pairs = zip(row, columns, strict=True)
-            rows.append(tuple(self._cell(key, number, each, column) for each, column in pairs))
+            rows.append(tuple(self._cell(key, number, cell, column) for cell, column in pairs))
         return tuple(rows)
 
     def table(self, key: str, name: str) -> Table:
@@ -163,11 +163,11 @@ class Table:
     def tables(self, key: str, name: str) -> list[Table]:
         """Read a list of tables within."""
         values = self.values.get(key, [])
-        if not isinstance(values, list) or not all(isinstance(each, dict) for each in values):
+        if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
             raise self.wrong(key, f"must be tables that begin with {name}")
         return [
-            Table(each, f"{self.where}: {name} {number}", self.source, (*self.way, (key, number)))
-            for number, each in enumerate(values, 1)
+            Table(value, f"{self.where}: {name} {number}", self.source, (*self.way, (key, number)))
+            for number, value in enumerate(values, 1)
         ]
 
     def _list(self, key: str, default: Sequence[Any] = ()) -> list[Any]:
@@ -194,10 +194,10 @@ class Table:
 def line_of(text: str, way: Way, key: str) -> int:
     """The number of the line with a key of a table, with the inline table that has it, or of its head; 0: not found."""
     head = 0
-    for found, number, is_key in toml_keys(text):
-        if is_key and found in ((*way, (key, 0)), way[: len(found)]):
+    for key_path, number, is_key in toml_keys(text):
+        if is_key and key_path in ((*way, (key, 0)), way[: len(key_path)]):
             return number
-        head = number if found == way else head
+        head = number if key_path == way else head
     return head
 
 

@@ -11,14 +11,14 @@ from multidrop.base.files import escaped_toml
 from multidrop.base.text import visible
 from multidrop.dialects.units import PLACES, Scale
 from multidrop.dialects.values import Reading, same
-from multidrop.simulator.cell.drive_keys import LONGEST
+from multidrop.simulator.cell.drive_keys import LONGEST_TEXT_VALUE
 from multidrop.simulator.declared import own_ports
 
 HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot apply FILE URL` puts a drive onto a unit."
 
 
 @dataclass(frozen=True)
-class Entry:
+class CellEntry:
     """One line of a table, with a remark after it."""
 
     key: str
@@ -37,9 +37,9 @@ class DriveText:
     unread: Sequence[tuple[str, str]] = ()
     """What could not be read, with reasons."""
     program: Sequence[str] = ()
-    settings: Sequence[Entry] = ()
-    variables: Sequence[Entry] = ()
-    identity: Sequence[Entry] = ()
+    settings: Sequence[CellEntry] = ()
+    variables: Sequence[CellEntry] = ()
+    identity: Sequence[CellEntry] = ()
     worlds: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: MappingProxyType({}))
     """The keys of each axis; "" is the only one."""
     ethernet: bool = False
@@ -61,12 +61,14 @@ class BusText:
 def remark(reading: Reading) -> str:
     """What a person wants to know of a value: its unit, and the factory's value where it differs."""
     known = reading.default is not None and not same(reading.default, reading.value)
-    return "; ".join(each for each in (reading.unit, f"factory {reading.default}" if known else "") if each)
+    return "; ".join(part for part in (reading.unit, f"factory {reading.default}" if known else "") if part)
 
 
 def plain(text: str) -> str:
     """A text that a unit reports, as `identity` takes it: odd characters become question marks."""
-    return "".join(each if each.isascii() and each.isprintable() else "?" for each in text)[:LONGEST]
+    return "".join(character if character.isascii() and character.isprintable() else "?" for character in text)[
+        :LONGEST_TEXT_VALUE
+    ]
 
 
 def write(buses: Sequence[BusText]) -> str:
@@ -76,11 +78,11 @@ def write(buses: Sequence[BusText]) -> str:
     document = tomlkit.document()
     document.add(tomlkit.comment(HEAD))
     scales = [scale for bus in buses for drive in bus.drives for scale in drive.units.values()]
-    if own := sorted({each.unit.name for each in scales}.difference(PLACES)):
+    if own := sorted({scale.unit.name for scale in scales}.difference(PLACES)):
         document.add("own_units", own)
     tables = tomlkit.aot()
-    for each in buses:
-        tables.append(_bus(each))
+    for bus in buses:
+        tables.append(_bus(bus))
     document.add("bus", tables)
     return escaped_toml(tomlkit.dumps(document))
 
@@ -88,8 +90,8 @@ def write(buses: Sequence[BusText]) -> str:
 def _bus(bus: BusText) -> Any:
     import tomlkit
 
-    ethernet = any(each.ethernet for each in bus.drives)
-    baud = bus.baud or next((each.baud for each in bus.drives if each.baud), 0)
+    ethernet = any(drive.ethernet for drive in bus.drives)
+    baud = bus.baud or next((drive.baud for drive in bus.drives if drive.baud), 0)
     table = tomlkit.table()
     table.add("name", bus.name)
     table.add("serve", [ANY_PORT, *map(ANY.format, own_ports())] if ethernet else ["pty:", ANY_PORT])
@@ -98,8 +100,8 @@ def _bus(bus: BusText) -> Any:
     for text in bus.missing:
         table.add(tomlkit.comment(visible(text)))
     drives = tomlkit.aot()
-    for each in bus.drives:
-        drives.append(_drive(each))
+    for drive in bus.drives:
+        drives.append(_drive(drive))
     if bus.drives:
         table.add("drive", drives)
     return table
@@ -118,7 +120,7 @@ def _drive(drive: DriveText) -> Any:
     if drive.party:
         table.add("party", True)
     if drive.units:
-        scales = {axis: _written(each) for axis, each in drive.units.items()}
+        scales = {axis: _written(unit) for axis, unit in drive.units.items()}
         table.add("units", scales[""] if "" in scales else _inline(scales))
     for text in (*drive.remarks, *_not_read(drive.unread)):
         table.add(tomlkit.comment(visible(text)))
@@ -134,14 +136,14 @@ def _drive(drive: DriveText) -> Any:
 
 def _written(scale: Scale) -> Any:
     """A scale as it is read again: its text, or a table where it has more."""
-    found: dict[str, str | int] = {"scale": str(scale)}
+    written: dict[str, str | int] = {"scale": str(scale)}
     if scale.anchored:
-        found["zero"] = scale.shown(scale.zero)
+        written["zero"] = scale.shown(scale.zero)
     if scale.travel is not None:
-        found["travel"] = scale.shown_travel
+        written["travel"] = scale.shown_travel
     if scale.full_steps is not None:
-        found["full_steps"] = scale.full_steps
-    return _inline(found) if len(found) > 1 else str(scale)
+        written["full_steps"] = scale.full_steps
+    return _inline(written) if len(written) > 1 else str(scale)
 
 
 def _inline(found: Mapping[str, Any]) -> Any:
@@ -160,15 +162,15 @@ def _not_read(unread: Sequence[tuple[str, str]]) -> list[str]:
     return [f"not read: {', '.join(names)} ({why})" for why, names in reasons.items()]
 
 
-def _entries(entries: Sequence[Entry]) -> Any:
+def _entries(entries: Sequence[CellEntry]) -> Any:
     import tomlkit
 
     table = tomlkit.table()
-    for each in entries:
-        item = tomlkit.item(each.value)
-        if each.remark:
-            item.comment(each.remark)
-        table.add(each.key, item)
+    for entry in entries:
+        item = tomlkit.item(entry.value)
+        if entry.remark:
+            item.comment(entry.remark)
+        table.add(entry.key, item)
     return table
 
 

@@ -26,9 +26,9 @@ from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports.sockets import exposed
 
 INPUT = "standard input"
-LONGEST = 64 * 1024
+LONGEST_INPUT_LINE = 64 * 1024
 """Bytes of a line of it."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM, *(getattr(signal, each, signal.SIGTERM) for each in ("SIGHUP", "SIGBREAK")))
+SIGNALS = (signal.SIGINT, signal.SIGTERM, *(getattr(signal, name, signal.SIGTERM) for name in ("SIGHUP", "SIGBREAK")))
 
 
 async def serve(
@@ -136,8 +136,8 @@ def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[s
     def readable() -> None:
         data = os.read(fd, 4096)
         *lines, rest = (bytes(begun) + data).split(b"\n")
-        if len(rest) > LONGEST:
-            _warn(f"{INPUT}: a line of more than {LONGEST} bytes was dropped")
+        if len(rest) > LONGEST_INPUT_LINE:
+            _warn(f"{INPUT}: a line of more than {LONGEST_INPUT_LINE} bytes was dropped")
             rest = b""
         begun[:] = rest
         if not data:

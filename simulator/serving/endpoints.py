@@ -18,7 +18,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.simulator.cell.endpoint_kinds import kind_of
 from multidrop.simulator.cell.spec import BusSpec, Endpoint
 from multidrop.simulator.declared import own_ports
-from multidrop.simulator.serving.running import PIECE, Client, InputQueue, Listener, RunningFloor
+from multidrop.simulator.serving.running import PIECE, InputQueue, Listener, RunningFloor, ServedClient
 
 BACKLOG = 1 << 20
 """Bytes that a TCP client may leave unread before it is disconnected."""
@@ -52,7 +52,7 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
         except OSError as error:
             reason = error.strerror or str(error)
             raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", f'bus "{bus.name}"') from None
-        served += [Served(bus.name, each) for each in urls]
+        served += [Served(bus.name, url) for url in urls]
     if sys.platform == "win32" and bus.serve and not served:
         raise Diagnostic(NO_TERMINALS, f'bus "{bus.name}"', 'serve = ["tcp://127.0.0.1:0"]')
     return served
@@ -142,7 +142,7 @@ class TcpServer(Listener):
         return not self._closed and self._floor.floor.connectable(self._bus)
 
 
-class TcpClient(asyncio.BufferedProtocol, Client):
+class TcpClient(asyncio.BufferedProtocol, ServedClient):
     """One client's connection: it receives the whole wire, and is read as fast as the wire carries what it writes."""
 
     gathers = True

@@ -116,17 +116,17 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
 
     families = [family_of(drive.personality) for drive in spec.drives]
     # on a mixed bus the dialect is that of a family whose drives always have an address
-    chosen = next((each for each in families if each.addressed), families[0] if families else None)
+    chosen = next((family for family in families if family.addressed), families[0] if families else None)
     return SimBus(
         name=spec.name,
         transport=pipe(),
         again=pipe,
         names=tuple(drive.name for drive in spec.drives),
         dialect=chosen.name if chosen else DEFAULT,
-        party=any(drive.party for drive in spec.drives) or any(each.addressed for each in families),
+        party=any(drive.party for drive in spec.drives) or any(family.addressed for family in families),
         floor=running.floor,
         baud=spec.baud,
-        units={f"{drive.name}.{axis}".rstrip("."): each for drive in spec.drives for axis, each in drive.units.items()},
+        units={f"{drive.name}.{axis}".rstrip("."): unit for drive in spec.drives for axis, unit in drive.units.items()},
     )
 
 

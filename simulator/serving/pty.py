@@ -21,7 +21,7 @@ import tty
 from pathlib import Path
 
 from multidrop.base.errors import Diagnostic
-from multidrop.simulator.serving.running import Client, InputQueue, RunningFloor
+from multidrop.simulator.serving.running import InputQueue, RunningFloor, ServedClient
 from multidrop.simulator.wire import resample
 
 # The number of clients that have a pseudo-terminal open, counted without polling.
@@ -89,7 +89,7 @@ def _watch(path: str) -> int | None:
 assert sys.platform != "win32"
 
 
-class Link:
+class PtyLink:
     """A link at a path. Raises Diagnostic if another server holds it. `where` names its bus in errors."""
 
     def __init__(self, path: Path, where: str) -> None:
@@ -151,14 +151,14 @@ FULL = contextlib.suppress(BlockingIOError)
 SPEEDS = {baud: code for code, baud in BAUDS.items()}
 
 
-class PtyServer(Client):
+class PtyServer(ServedClient):
     """Serves one bus on a pseudo-terminal, with a symlink at `link` if one is given. Raises Diagnostic."""
 
     gathers = True
 
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
         self._floor, self._bus = floor, bus
-        self._link = Link(link, f'bus "{bus}"') if link else None
+        self._link = PtyLink(link, f'bus "{bus}"') if link else None
         self._queue = InputQueue(floor, bus, self)
         self._master = self._slave = -1
         self._watch: TtyWatch | None = None

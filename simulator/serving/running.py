@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable
 from math import inf
 
-from multidrop.simulator.family import Connection, Shadow
+from multidrop.simulator.family import PortConnection, Shadow
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.wire import BITS_A_BYTE, Wire
 from multidrop.transports.pipe import running_loop
@@ -25,7 +25,7 @@ HOLD = 4096
 """Bytes of one client that wait in the queue."""
 PIECE = 256
 """Bytes that are read at a time, so that no turn of the event loop takes long; at least as many wait on the wire."""
-AHEAD = 0.02
+SECONDS_AHEAD = 0.02
 """Seconds of a fast wire's bytes that wait on it, if those are more."""
 POLL = 0.01
 """Seconds between two polls while a client is not read."""
@@ -157,7 +157,7 @@ class RunningFloor:
             else:
                 self._turn()
 
-    def exchange(self, bus: str, connection: Connection, data: bytes) -> bytes:
+    def exchange(self, bus: str, connection: PortConnection, data: bytes) -> bytes:
         """Pass a client's bytes to its connection; give the reply. Nothing passes while the bus is unplugged."""
         if self._closed:
             return b""
@@ -191,8 +191,8 @@ class RunningFloor:
     def shadow(self, bus: str, name: str) -> Shadow | None:
         """The reading of a drive without its wire, up to date; None where the cell has no such drive."""
         self._turn()
-        found = [each for each in self.floor.drives if each.bus == bus]
-        named = [each for each in found if each.spec.name == name] or (found if len(found) == 1 else [])
+        drives = [drive for drive in self.floor.drives if drive.bus == bus]
+        named = [drive for drive in drives if drive.spec.name == name] or (drives if len(drives) == 1 else [])
         return named[0].unit.shadow if named else None
 
     def close(self) -> None:
@@ -242,7 +242,7 @@ class RunningFloor:
         self._turn()
 
 
-class Client(Listener):
+class ServedClient(Listener):
     """The endpoint of one client, that a queue reads and pauses."""
 
     def pause(self) -> None:
@@ -265,9 +265,9 @@ class Client(Listener):
 class InputQueue:
     """Puts what a client writes on the wire, and pauses its reading while the wire is slower."""
 
-    def __init__(self, floor: RunningFloor, bus: str, client: Client) -> None:
+    def __init__(self, floor: RunningFloor, bus: str, client: ServedClient) -> None:
         self._floor, self._bus = floor, bus
-        self._client: Client | None = client
+        self._client: ServedClient | None = client
         self._source = floor.source()
         self._pending: deque[tuple[bytes, int | None]] = deque()
         self._waiting = 0
@@ -302,7 +302,7 @@ class InputQueue:
 
     def _feed(self) -> None:
         """Hand the wire as much as it has room for."""
-        most = max(PIECE, int(AHEAD * self._floor.bytes_a_second(self._bus)))
+        most = max(PIECE, int(SECONDS_AHEAD * self._floor.bytes_a_second(self._bus)))
         wire = self._floor.floor.wires[self._bus]
         while self._pending and (room := most - wire.queued(self._source)) > 0:
             data, baud = self._pending.popleft()

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.files import (
-    DEEPEST,
-    LARGEST,
+    DEEPEST_TABLES,
+    LARGEST_FILE,
     MOST_LINES,
     bytes_of,
     encoded_program_of,
@@ -130,9 +130,9 @@ def test_a_device_and_a_pipe_with_a_name_are_refused_unopened(name: str, tmp_pat
 def test_the_largest_file_is_read_and_one_byte_more_is_not(tmp_path):
     file = tmp_path / "a"
     file.touch()
-    os.truncate(file, LARGEST)
-    assert len(bytes_of(file)) == LARGEST
-    os.truncate(file, LARGEST + 1)
+    os.truncate(file, LARGEST_FILE)
+    assert len(bytes_of(file)) == LARGEST_FILE
+    os.truncate(file, LARGEST_FILE + 1)
     with pytest.raises(Diagnostic, match="is larger than 1 MB"):
         bytes_of(file)
 
@@ -160,7 +160,7 @@ def test_texts_and_remarks_nest_nothing() -> None:
     marks = "[{.," * 100
     text = f'# {marks}\na = "{marks}"\nb = \'{marks}\'\nc = """{marks}\n{marks}"""\n' + "d = [1.5, 2.5]\n" * 0
     assert toml_of(text, "x").keys() == {"a", "b", "c"}
-    assert toml_of(".".join(["a"] * DEEPEST) + " = 1", "x")
+    assert toml_of(".".join(["a"] * DEEPEST_TABLES) + " = 1", "x")
 
 
 def test_a_name_that_is_empty_is_shown_as_one():

@@ -10,7 +10,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
-from multidrop.base.foreign import Guard, callback, guarded
+from multidrop.base.foreign import ForeignGuard, callback, guarded
 from multidrop.base.isolation import LOG, isolated
 from multidrop.drives.events import Publisher
 
@@ -24,7 +24,7 @@ def raising(failure: BaseException) -> Any:
     def function() -> None:
         raise failure
 
-    return Guard("gauge").function(function)
+    return ForeignGuard("gauge").function(function)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,9 @@ class Taker:
         """Take an event."""
 
 
-@pytest.mark.parametrize("function", [subscriber, partial(subscriber), Taker(), Guard("gauge").function(subscriber)])
+@pytest.mark.parametrize(
+    "function", [subscriber, partial(subscriber), Taker(), ForeignGuard("gauge").function(subscriber)]
+)
 def test_an_async_subscriber_is_refused_in_one_line(function: Any) -> None:
     wants = " is async, and nothing awaits it; give a plain function, which may start a task$"
     with pytest.raises(Diagnostic, match=wants):
@@ -69,7 +71,7 @@ async def test_work_that_a_stop_cancels_is_cancelled() -> None:
     async def work() -> None:
         await asyncio.Event().wait()
 
-    task = asyncio.ensure_future(Guard("gauge").function(work)())
+    task = asyncio.ensure_future(ForeignGuard("gauge").function(work)())
     await asyncio.sleep(0)
     task.cancel()
     with pytest.raises(asyncio.CancelledError):

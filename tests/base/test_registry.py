@@ -142,7 +142,7 @@ def test_packages_are_read_once_until_the_environment_changes(tmp_path: Path, mo
 
     monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
     first = registry.entries()
-    assert first == [registry.Entry("gauge", "multidrop-gauge", "2.0", "package_gauge:FEATURE")]
+    assert first == [registry.FeatureEntry("gauge", "multidrop-gauge", "2.0", "package_gauge:FEATURE")]
     assert registry.entries() == first and reads == ["multidrop.features", "multidrop.families"]
     os.utime(site, ns=(1, 1))
     assert registry.entries() == first and len(reads) == 4
@@ -164,7 +164,7 @@ def test_a_package_brings_a_family_by_an_entry_point_of_its_own(
 def test_what_is_kept_of_packages_may_be_damaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [package("gauge", "g:FEATURE")])
     first = registry.entries()
-    (tmp_path / "state" / registry.KEPT).write_text("[1")
+    (tmp_path / "state" / registry.FEATURES_FILE).write_text("[1")
     assert registry.entries() == first
 
 
@@ -246,5 +246,5 @@ def test_of_two_features_for_a_single_place_the_later_one_is_refused(own: Path) 
 
 def test_what_features_add_is_found_by_its_class(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "IN_WHEEL", {})
-    registry._others["p"] = registry.Entry("x", "dist", "1", "p"), Feature("x", "y", adds=(1, "a", 2.5, 3))
+    registry._others["p"] = registry.FeatureEntry("x", "dist", "1", "p"), Feature("x", "y", adds=(1, "a", 2.5, 3))
     assert list(registry.added(int)) == [1, 3] and list(registry.added(str)) == ["a"]

@@ -15,7 +15,7 @@ from multidrop.dialects.values import Conditions
 from multidrop.features.publishing import feed, registry
 from multidrop.features.publishing.feed import Topics
 from multidrop.features.publishing.registry import error_of
-from multidrop.shell.log.files import Entry
+from multidrop.shell.log.files import LogEntry
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "docs" / "recipes"
@@ -26,7 +26,7 @@ ERROR = error_of([Conditions(error=5, error_text="limit")])
 TEXTS = {
     TOPICS.status: "online",
     TOPICS.bus_status("a/b+"): "lost",
-    TOPICS.transcript("press"): feed.line_text(Entry(NOW, "typed", "PR P", "press", "a", by="operator")),
+    TOPICS.transcript("press"): feed.line_text(LogEntry(NOW, "typed", "PR P", "press", "a", by="operator")),
     TOPICS.drive("press", "a", "position"): feed.value_text(NOW, {"value": 5, "axis": "x"}),
     TOPICS.drive("eth", "", "velocity"): feed.value_text(NOW, {"value": -5, "axis": ""}),
     TOPICS.drive("press", "a", "state"): feed.value_text(NOW, {"value": "moving", "program": "G1"}),

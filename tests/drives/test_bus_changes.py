@@ -7,7 +7,7 @@ import pytest
 from multidrop.dialects import DriveState, Hints, StopPiece
 from multidrop.drives.events import Changed
 from multidrop.drives.link import Reserved
-from multidrop.drives.stop_ahead import Begun
+from multidrop.drives.stop_ahead import BegunStop
 from multidrop.drives.stop_forms import StopForms
 from multidrop.drives.stopping import _hears, _ran
 from multidrop.families.lexium.host.mcode.codec import MCode
@@ -117,9 +117,9 @@ def test_whether_a_program_ran_before_a_stop_follows_from_the_last_reading_or_fr
     from types import SimpleNamespace
 
     from multidrop.dialects import Started
-    from multidrop.drives.readings import Running
+    from multidrop.drives.readings import ProgramReading
 
-    drive: Any = SimpleNamespace(running=running and Running(*running), started_at=started_at)
+    drive: Any = SimpleNamespace(running=running and ProgramReading(*running), started_at=started_at)
     started = {} if what is None else {id(drive): Started(frozenset(), *what)}
     halt: Any = SimpleNamespace(started=SimpleNamespace(get=lambda drive: started.get(id(drive))))
     assert _ran(drive, halt) is ran
@@ -132,12 +132,12 @@ def forms(gap: float = 0.0, immediate: bytes = b"ABORT") -> StopForms:
     return StopForms(immediate, b"", (), b"", False, gap=gap)
 
 
-def begun(*pieces: StopPiece, gap: float = 0.0, left: float = 2.0) -> Begun:
-    return Begun(forms(gap), b"ABORT", left, [*pieces])
+def begun(*pieces: StopPiece, gap: float = 0.0, left: float = 2.0) -> BegunStop:
+    return BegunStop(forms(gap), b"ABORT", left, [*pieces])
 
 
 def test_a_stop_that_was_begun_has_made_no_line_harmless():
-    assert begun() == Begun(forms(), b"ABORT", 2.0, [], [], False, False, None)
+    assert begun() == BegunStop(forms(), b"ABORT", 2.0, [], [], False, False, None)
 
 
 @pytest.mark.parametrize(

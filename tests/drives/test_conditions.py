@@ -9,8 +9,8 @@ import pytest
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.dialects.values import Part
 from multidrop.drives.events import Conditioned
-from multidrop.drives.readings import Running
-from multidrop.drives.telemetry import AGED, LEAST, Telemetry
+from multidrop.drives.readings import ProgramReading
+from multidrop.drives.telemetry import AGED, LEAST_AGE, Telemetry
 from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
@@ -20,7 +20,7 @@ class Drive:
     """A drive with a quick part and a slow one."""
 
     programming = transferring = False
-    running: Running | None = None
+    running: ProgramReading | None = None
 
     def __init__(self, link: ToldLink, address: str = "a") -> None:
         self.link, self.address, self.shown, self.commands = link, address, address, 0
@@ -89,7 +89,7 @@ async def test_after_a_command_the_settings_are_read_again_but_not_too_often():
     telemetry.watch(["a"], 0.5)
     await a.for_(0.1)
     a.commands = 1
-    assert [at for at, name in await a.for_(5) if name == "limits"] == [LEAST + 0.5 - 0.1]
+    assert [at for at, name in await a.for_(5) if name == "limits"] == [LEAST_AGE + 0.5 - 0.1]
     assert a.settings["limits"][1] == 1
     assert [at for at, name in await a.for_(5) if name == "limits"] == []
 
@@ -194,7 +194,7 @@ async def test_that_a_program_runs_is_noted_with_the_beginning_of_the_reading(ru
     begun = link.now()
     telemetry.watch(["a"], 1.0)
     await a.for_(0.5)
-    assert a.running == (None if runs is None else Running(begun, runs))
+    assert a.running == (None if runs is None else ProgramReading(begun, runs))
 
 
 async def test_the_end_of_the_last_subscription_ends_the_reading():

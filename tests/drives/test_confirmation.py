@@ -11,7 +11,7 @@ from multidrop.dialects import Motion, Started
 from multidrop.drives import stopping
 from multidrop.drives.events import Sample
 from multidrop.drives.halts import Halt
-from multidrop.drives.readings import Running, Seen
+from multidrop.drives.readings import MotionReading, ProgramReading
 from multidrop.drives.stop_readings import ENDLESS, NOTHING, Activity, read_activity
 from multidrop.drives.stopping import BETWEEN, RAMP, Stopping
 
@@ -50,8 +50,8 @@ class Drive:
     def __init__(self, link: Link, name: str, *readings: Any) -> None:
         self.link, self.shown, self.address = link, name, name
         self.readings, self.times = list(readings), list[float]()
-        self.seen: Seen | None = None
-        self.running: Running | None = None
+        self.seen: MotionReading | None = None
+        self.running: ProgramReading | None = None
         self.codec = SimpleNamespace(spares=False)
         self.family = SimpleNamespace(units=SimpleNamespace(axes=lambda: ("x", "y")))
 
@@ -64,8 +64,8 @@ class Drive:
         if found is not ENDLESS:
             before = self.seen
             rest = before.at if before is not None and not before.velocity and not found.speed else float("-inf")
-            self.seen = Seen(now, found.speed, (found.speed,), now, rest)
-            self.running = Running(now, found.runs)
+            self.seen = MotionReading(now, found.speed, (found.speed,), now, rest)
+            self.running = ProgramReading(now, found.runs)
         return found, ""
 
 

@@ -11,7 +11,7 @@ from multidrop.dialects import Motion
 from multidrop.dialects.family import Referencing
 from multidrop.drives.drive import Drive, confirmed_motion, still
 from multidrop.drives.events import Changed
-from multidrop.drives.readings import REST, Running, Seen
+from multidrop.drives.readings import LEAST_REST, MotionReading, ProgramReading
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
 
@@ -259,7 +259,7 @@ async def test_a_reading_at_rest_is_kept_with_what_was_sent_so_far():
 async def test_a_drive_is_calm_where_no_program_runs(runs, calm):
     shop, drive = await drive_a()
     drive.state.program_read(error=False, running=False)  # type: ignore[attr-defined]
-    drive.running = Running(0.0, runs)
+    drive.running = ProgramReading(0.0, runs)
     drive.family = replaced_motion(drive, Motion(0, 0))
     await drive.motion()
     assert drive.calm is calm
@@ -281,7 +281,7 @@ async def test_that_a_program_runs_is_noted_with_the_time_of_the_question():
     shop, drive = await drive_a()
     at = shop.bus.now()
     assert await drive.busy() is False
-    assert drive.running == Running(at, False)
+    assert drive.running == ProgramReading(at, False)
 
 
 async def test_a_drive_that_is_silent_is_missing_until_it_replies_and_is_compared_then():
@@ -334,7 +334,7 @@ class Reads:
 
     def __init__(self, *found: Any) -> None:
         self.found, self.times = list(found), list[float]()
-        self.seen: Seen | None = None
+        self.seen: MotionReading | None = None
 
     async def motion(self) -> Any:
         self.times.append(asyncio.get_running_loop().time())
@@ -346,7 +346,11 @@ class Reads:
         return self.found.pop(0)
 
 
-RESTED, ONCE, MOVES = Seen(1.0, 0, (0,), 1.0, 0.5), Seen(1.0, 0, (0,), 1.0), Seen(1.0, 5, (5,), 1.0)
+RESTED, ONCE, MOVES = (
+    MotionReading(1.0, 0, (0,), 1.0, 0.5),
+    MotionReading(1.0, 0, (0,), 1.0),
+    MotionReading(1.0, 5, (5,), 1.0),
+)
 
 
 @pytest.mark.parametrize(("first", "reads"), [(RESTED, 1), (ONCE, 2), (MOVES, 1), (None, 1)])
@@ -354,7 +358,7 @@ async def test_a_velocity_of_0_is_read_again_unless_it_is_confirmed(first, reads
     drive: Any = Reads((first, "first"), (RESTED, "second"))
     assert await confirmed_motion(drive) == ("first", "second")[reads - 1]
     assert len(drive.times) == reads
-    assert drive.times[-1] - drive.times[0] == pytest.approx(REST * (reads - 1))
+    assert drive.times[-1] - drive.times[0] == pytest.approx(LEAST_REST * (reads - 1))
 
 
 @pytest.mark.parametrize(
@@ -364,7 +368,7 @@ async def test_a_velocity_of_0_is_read_again_unless_it_is_confirmed(first, reads
 async def test_a_drive_is_still_where_two_readings_are_the_same(found, rests, reads):
     drive: Any = Reads(*found)
     assert await still(drive) is rests
-    assert len(drive.times) == reads and drive.times[-1] - drive.times[0] == pytest.approx(REST * (reads - 1))
+    assert len(drive.times) == reads and drive.times[-1] - drive.times[0] == pytest.approx(LEAST_REST * (reads - 1))
 
 
 async def test_a_language_without_a_command_to_all_gets_each_line_by_itself_and_the_first_failure_is_raised():

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.drives.echoes import ENOUGH, LONGEST_TAIL, MOST_HEARD, WATCHED, EchoWatch, Heard, LocalEcho
+from multidrop.drives.echoes import ENOUGH, LONGEST_TAIL, MOST_HEARD, WATCHED, EchoWatch, FirstBytes, LocalEcho
 
 
 @dataclass
@@ -113,7 +113,7 @@ def test_only_requests_are_looked_for_and_only_so_many():
 
 
 def test_until_a_drive_has_replied_what_came_is_kept_without_our_own_bytes():
-    heard = Heard()
+    heard = FirstBytes()
     heard.received(b"aPR P\rb")
     heard.wrote(b"PR P\r")
     heard.received(b"PR P\r")
@@ -124,7 +124,7 @@ def test_until_a_drive_has_replied_what_came_is_kept_without_our_own_bytes():
 
 
 def test_after_a_reply_nothing_is_kept():
-    heard = Heard()
+    heard = FirstBytes()
     heard.received(b"x")
     heard.wrote(b"PR P\r")
     heard.replied("a")
@@ -135,7 +135,7 @@ def test_after_a_reply_nothing_is_kept():
 
 
 def test_only_so_much_is_kept():
-    heard = Heard()
+    heard = FirstBytes()
     heard.received(b"x" * (MOST_HEARD + 1))
     assert heard.came == b"x" * MOST_HEARD
     for _ in range(MOST_HEARD + 1):

@@ -8,7 +8,7 @@ from multidrop.base.errors import NoAnswer
 from multidrop.dialects import Decoded, DriveState, End, Kind, Reply, Request, StopPiece
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import TAIL
-from multidrop.drives.line import QUIET, Finished, Line, Write
+from multidrop.drives.line import RECOVERY_QUIET, Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.procedure import ProcedureRunner
 
@@ -70,7 +70,7 @@ def test_a_late_answer_that_comes_in_two_halves_around_a_timeout_does_not_derail
     line.receive(b"\x02", 0.9)
     assert ended(line.events(1.9)) == [("late", End.TIMEOUT, ())]
     line.ask(asked("next"))
-    line.events(1.9 + QUIET)
+    line.events(1.9 + RECOVERY_QUIET)
     line.receive(b"\x01L" + bytes((2, 2)) + b"N", 2.1)
     assert ended(line.events(2.1)) == [("next", End.DONE, ("N",))]
 
@@ -96,7 +96,7 @@ def test_a_stop_in_the_middle_of_an_answer_keeps_its_first_half():
     assert ended(line.events(0.1)) == [("x", End.STOPPED, ())]
     line.receive(b"L", 0.15)
     line.ask(asked("next"))
-    events = line.events(0.15 + QUIET) + line.events(0.15 + 2 * QUIET)
+    events = line.events(0.15 + RECOVERY_QUIET) + line.events(0.15 + 2 * RECOVERY_QUIET)
     assert [e.data for e in events if isinstance(e, Write)] == [b"S", b"\x02\x02?"]
     line.receive(bytes((2, 2)) + b"N", 0.5)
     assert ended(line.events(0.5)) == [("next", End.DONE, ("N",))]
@@ -109,7 +109,7 @@ def test_a_stop_is_repeated_piece_by_piece_with_quiet_between():
     for step in range(1, 100):
         seen += [(step, e.data) for e in line.events(step / 100) if isinstance(e, Write)]
     assert [data for _, data in seen] == [b"one", b"two"]
-    assert seen[0][0] >= QUIET * 100 and seen[1][0] - seen[0][0] >= QUIET * 100
+    assert seen[0][0] >= RECOVERY_QUIET * 100 and seen[1][0] - seen[0][0] >= RECOVERY_QUIET * 100
 
 
 def test_other_languages_still_show_half_a_line_and_forget_it():
@@ -281,12 +281,12 @@ def test_a_stop_within_a_reply_forgets_no_half_of_it(came):
     host.line.stop(host.now, StopPiece(b"S"))
     host.look()
     host.hear(data[came:])
-    host.wait(2 * QUIET)
+    host.wait(2 * RECOVERY_QUIET)
     assert [reply[0] for reply in host.replies] == [End.STOPPED]
     assert host.strays in ([data.hex(" ")], [])  # late, and nobody's
     assert host.written == [nine("\1", "G"), b"S"]
     host.line.ask(Request("\1", "G", Kind.PRINT, Nines()))
-    host.wait(2 * QUIET)
+    host.wait(2 * RECOVERY_QUIET)
     host.hear(nine("\2", "G", 6))
     assert host.replies[-1][:2] == (End.DONE, ("6",))
 

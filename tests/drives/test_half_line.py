@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.drives.half_line import LONGEST, REPLIED, HalfLine, Parts, Rest
+from multidrop.drives.half_line import LONGEST_KEPT_TEXT, REPLIED, FrameDivider, HalfLine, Rest
 
 CR, LF = 13, 10
 EITHER, RETURN, FEED = b"\r\n", b"\r", b"\n"
@@ -61,8 +61,8 @@ def test_a_line_feed_that_is_no_end_of_a_line_is_no_part_of_it():
 
 
 def test_the_last_bytes_of_a_long_line_are_kept():
-    line = begun(RETURN, (b"x" + b"y" * LONGEST, 1.0))
-    assert line.text == b"y" * LONGEST
+    line = begun(RETURN, (b"x" + b"y" * LONGEST_KEPT_TEXT, 1.0))
+    assert line.text == b"y" * LONGEST_KEPT_TEXT
 
 
 def test_messages_that_carry_their_length_begin_no_line():
@@ -172,7 +172,7 @@ def test_the_rest_of_a_line_is_dropped_up_to_its_end(data, left, dropping):
 
 
 def test_frames_pass_once_they_are_whole():
-    parts = Parts(3)
+    parts = FrameDivider(3)
     assert [parts.whole(each) for each in (b"ab", b"", b"cd", b"efgh", b"i")] == [b"", b"", b"abc", b"def", b"ghi"]
     assert parts.whole(b"jk") == b"" and parts.held == b"jk"
     assert parts.forgotten() == b"jk" and parts.held == b""
@@ -180,5 +180,5 @@ def test_frames_pass_once_they_are_whole():
 
 
 def test_without_frames_all_bytes_pass():
-    parts = Parts(0)
+    parts = FrameDivider(0)
     assert parts.whole(b"ab") == b"ab" and parts.held == b""

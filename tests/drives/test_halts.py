@@ -8,7 +8,7 @@ import pytest
 from multidrop.base.errors import TransportLost
 from multidrop.dialects import Started
 from multidrop.drives.halts import Fate, Halt
-from multidrop.drives.readings import Running, Seen
+from multidrop.drives.readings import MotionReading, ProgramReading
 from multidrop.transports import Undelivered
 
 AT = 10.0
@@ -32,14 +32,14 @@ def halt(*drives: Any, lost: Any = None, data: bytes = b"\x1b", **more: Any) -> 
     return Halt(link, AT, 1, True, drives, data=data, **more)
 
 
-def seen(at: float, velocity: int = 0, confirms: float = float("-inf")) -> Seen:
-    return Seen(at, velocity, (velocity,), at, confirms)
+def seen(at: float, velocity: int = 0, confirms: float = float("-inf")) -> MotionReading:
+    return MotionReading(at, velocity, (velocity,), at, confirms)
 
 
 RESTS = seen(11.0, confirms=10.9)
-STANDS = {"seen": RESTS, "running": Running(11.0, False)}
+STANDS = {"seen": RESTS, "running": ProgramReading(11.0, False)}
 MOVES = seen(11.0, 300)
-RUNS = Running(11.0, True)
+RUNS = ProgramReading(11.0, True)
 
 
 @pytest.mark.parametrize(
@@ -48,16 +48,16 @@ RUNS = Running(11.0, True)
         ({}, Fate.SENT),
         (STANDS, Fate.STANDING),
         ({"seen": RESTS}, Fate.SENT),
-        ({"running": Running(11.0, False)}, Fate.SENT),
-        ({"seen": seen(11.0), "running": Running(11.0, False)}, Fate.SENT),
+        ({"running": ProgramReading(11.0, False)}, Fate.SENT),
+        ({"seen": seen(11.0), "running": ProgramReading(11.0, False)}, Fate.SENT),
         ({"seen": RESTS, "running": RUNS}, Fate.RUNNING),
         ({"running": RUNS}, Fate.RUNNING),
         ({"seen": MOVES}, Fate.MOVING),
         ({"seen": MOVES, "running": RUNS}, Fate.MOVING),
-        ({"seen": seen(11.0, -300), "running": Running(11.0, False)}, Fate.MOVING),
+        ({"seen": seen(11.0, -300), "running": ProgramReading(11.0, False)}, Fate.MOVING),
         ({"seen": seen(AT, 300)}, Fate.SENT),
-        ({"running": Running(AT, True)}, Fate.SENT),
-        ({"seen": seen(11.0, confirms=AT), "running": Running(11.0, False)}, Fate.SENT),
+        ({"running": ProgramReading(AT, True)}, Fate.SENT),
+        ({"seen": seen(11.0, confirms=AT), "running": ProgramReading(11.0, False)}, Fate.SENT),
         (STANDS | {"commanded_at": 10.1}, Fate.STARTED),
         (STANDS | {"commanded_at": AT, "started_at": AT}, Fate.STANDING),
         (STANDS | {"started_at": 10.95}, Fate.SENT),

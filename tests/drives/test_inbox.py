@@ -11,7 +11,7 @@ from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.inbox import (
     CERTAIN,
     LASTS,
-    LATE,
+    LATE_WITHIN,
     MOST_EVIDENCE,
     NEVER_QUIET,
     TAIL,
@@ -141,8 +141,8 @@ def test_a_reply_is_doubtful_where_it_may_be_the_one_that_is_outstanding(late, r
 
 
 def test_a_late_reply_is_awaited_for_a_while():
-    assert doubt((asked("b"), NONE, b"")).weigh(asked(), VALUE, LATE - 0.1, b"") == DOUBTFUL
-    assert doubt((asked("b"), NONE, b"")).weigh(asked(), VALUE, LATE, b"") == CERTAIN
+    assert doubt((asked("b"), NONE, b"")).weigh(asked(), VALUE, LATE_WITHIN - 0.1, b"") == DOUBTFUL
+    assert doubt((asked("b"), NONE, b"")).weigh(asked(), VALUE, LATE_WITHIN, b"") == CERTAIN
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_a_mark_must_be_executed_to_end_the_wait(reply, ends):
 def test_a_doubtful_reply_makes_the_wait_longer():
     waits = doubt((asked(), NONE, b""))
     assert waits.weigh(asked(), VALUE, 6.0, b"") == DOUBTFUL
-    assert waits.weigh(asked(), VALUE, 6.0 + LATE - 0.1, b"") == DOUBTFUL
+    assert waits.weigh(asked(), VALUE, 6.0 + LATE_WITHIN - 0.1, b"") == DOUBTFUL
 
 
 def test_the_mark_of_a_drive_whose_nak_may_have_been_anothers_is_doubtful():
@@ -368,7 +368,7 @@ def answers(line: str) -> bool:
 
 @pytest.mark.parametrize(
     ("now", "lines", "left"),
-    [(0.0, ("x",), ("=1",)), (LATE, ("x",), ("=1",)), (LATE + 0.1, ("x", "=1"), ())],
+    [(0.0, ("x",), ("=1",)), (LATE_WITHIN, ("x",), ("=1",)), (LATE_WITHIN + 0.1, ("x", "=1"), ())],
 )
 def test_a_reply_to_a_session_before_may_come_for_a_while(now, lines, left):
     leftovers = Leftovers()
@@ -409,8 +409,8 @@ def test_while_a_session_before_is_cleared_up_all_that_comes_is_its_own():
 def test_an_echo_of_what_was_sent_is_no_print(line, shown):
     leftovers = Leftovers()
     leftovers.request_written(b"aPR P\x81\r", 0.0)
-    assert leftovers.divided((line, "print"), answers, LATE) == ((line, "print") if shown else ("print",), ())
-    assert leftovers.divided((line,), answers, LATE + 0.1) == ((line,), ())
+    assert leftovers.divided((line, "print"), answers, LATE_WITHIN) == ((line, "print") if shown else ("print",), ())
+    assert leftovers.divided((line,), answers, LATE_WITHIN + 0.1) == ((line,), ())
 
 
 def test_a_request_of_one_character_has_no_echo():

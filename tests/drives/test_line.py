@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.line import QUIET, Finished, Line, Write
+from multidrop.drives.line import RECOVERY_QUIET, Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.framing import sealed
 from tests.support.line_run import LineRun
@@ -81,7 +81,7 @@ def test_a_late_answer_is_a_stray_and_never_the_next_requests():
     line.ask(request("PR V"))
     late = {1.05: b"\r\n111\r\n", 1.5: b"\r\n2\r\n"}
     run = LineRun(line, 5.0, late)
-    assert run.written == [(0.0, b"PR P\r"), (round(1.05 + QUIET, 4), b"PR V\r")]
+    assert run.written == [(0.0, b"PR P\r"), (round(1.05 + RECOVERY_QUIET, 4), b"PR V\r")]
     assert run.ended == [(1.0, "PR P", End.TIMEOUT, ()), (1.5, "PR V", End.DONE, ("2",))]
     assert (1.05, Unsolicited(1.05, ("111",))) in run.seen
 
@@ -240,7 +240,7 @@ def test_after_a_break_nothing_is_written_until_the_wire_has_been_quiet():
     assert flight is not None and flight.request.text == "MR 1" and not line.waiting
     line.ask(request("PR P"))
     run = LineRun(line, 3.0, {1.05: b"\r\n"}, start=1.0)
-    assert run.written[0] == (round(1.05 + QUIET, 4), b"PR P\r")
+    assert run.written[0] == (round(1.05 + RECOVERY_QUIET, 4), b"PR P\r")
 
 
 @pytest.mark.parametrize(("cut", "doubtful"), [("PR A", True), ("", False)])

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.inbox import LATE
+from multidrop.drives.inbox import LATE_WITHIN
 from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.examples import examples
@@ -125,9 +125,9 @@ def test_doubt_does_not_last_for_ever():
     line.ask(request("PR P", PARTY, "a"))
     LineRun(line, 2.0)
     line.ask(request("PR P", PARTY, "b"))
-    line.events(2.0 + LATE)
-    line.receive(b"\r\n5\r\n", 2.1 + LATE)
-    [done] = [e for e in line.events(2.1 + LATE) if isinstance(e, Finished)]
+    line.events(2.0 + LATE_WITHIN)
+    line.receive(b"\r\n5\r\n", 2.1 + LATE_WITHIN)
+    [done] = [e for e in line.events(2.1 + LATE_WITHIN) if isinstance(e, Finished)]
     assert not done.reply.doubtful
 
 

@@ -11,9 +11,9 @@ from multidrop.drives.inbox import NEVER_QUIET, TAIL
 from multidrop.drives.line import (
     CHATTER,
     HELD_UP,
+    LONG_QUIET,
     LONGEST_LIST,
-    PAUSE,
-    QUIET,
+    RECOVERY_QUIET,
     Finished,
     Flight,
     Line,
@@ -115,7 +115,7 @@ def test_a_drive_that_refused_by_nak_is_asked_before_another_one_after_a_pause()
     for text, address in (("2", "b"), ("3", "a"), ("4", "c")):
         line.ask(asked(text, address))
     run = LineRun(line, 3.0, {0.1: b"n;", 0.5: b"x;", 0.6: b"x;", 0.7: b"x;"}, start=0.05)
-    assert run.written == [(round(0.1 + QUIET, 4), b"3"), (0.5, b"2"), (0.6, b"4")]
+    assert run.written == [(round(0.1 + RECOVERY_QUIET, 4), b"3"), (0.5, b"2"), (0.6, b"4")]
 
 
 def test_a_nak_with_nothing_behind_it_needs_no_pause():
@@ -153,7 +153,7 @@ def test_after_trouble_the_line_waits_for_quiet():
     line.ask(asked("1"))
     line.ask(asked("2"))
     run = LineRun(line, 2.0, {1.05: b"late"})
-    assert run.written == [(0.0, b"1"), (round(1.05 + QUIET, 4), b"2")]
+    assert run.written == [(0.0, b"1"), (round(1.05 + RECOVERY_QUIET, 4), b"2")]
     assert run.ended[0] == (1.0, "1", End.TIMEOUT, ())
 
 
@@ -222,7 +222,7 @@ A, B, C, LATE, LATER = piece("A"), piece("B"), piece("C"), piece("L", 0.6), piec
         ([A, B], [A, B], []),
         ([A, LATE, B], [A], [LATE, B]),
         ([LATE], [], [LATE]),
-        ([piece("x", PAUSE), LATE], [piece("x", PAUSE)], [LATE]),
+        ([piece("x", LONG_QUIET), LATE], [piece("x", LONG_QUIET)], [LATE]),
     ],
 )
 def test_a_longer_quiet_divides_a_stop(pieces, before, behind):
@@ -328,11 +328,11 @@ def test_a_recovering_line_has_a_deadline_only_where_something_waits():
     line.stop(1.0)
     assert line.deadline is None
     line.ask(asked())
-    assert line.deadline == 1.0 + QUIET
+    assert line.deadline == 1.0 + RECOVERY_QUIET
     line.receive(b"x", 1.05)
     assert line.deadline == pytest.approx(1.05 + TAIL)
     line.events(1.1)
-    assert line.deadline == pytest.approx(1.05 + QUIET)
+    assert line.deadline == pytest.approx(1.05 + RECOVERY_QUIET)
     assert Recovering(1.0).held_up_since == float("inf")
 
 

@@ -8,7 +8,7 @@ import pytest
 from multidrop.base.errors import TransportLost
 from multidrop.dialects import End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
-from multidrop.drives.inbox import LATE
+from multidrop.drives.inbox import LATE_WITHIN
 from multidrop.drives.line import Line
 from multidrop.drives.link import AS_GREETING, ECHO, GREETING, UNASKED, UNLIKE_A_DRIVE, Link, LostInFlight, Reserved
 from multidrop.drives.port_journal import Keeper
@@ -211,7 +211,7 @@ async def test_a_long_line_is_shown_from_its_beginning():
 
 async def test_what_a_session_before_has_left_is_said_and_is_no_print():
     desk = heard(Desk(Picky(em=1)))
-    await desk.hear(b"=5\r\none\r\n", LATE + 0.1)
+    await desk.hear(b"=5\r\none\r\n", LATE_WITHIN + 0.1)
     await desk.hear(b"=6\r\n")
     assert desk.prints == [(("one",), False), (("=6",), False)]
     assert desk.told == ["left by a session before, not printed by a program: '=5'"]

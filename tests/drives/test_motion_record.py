@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects.motions import Effect, Ending, Evidence, Move, MoveKind, Outcome
-from multidrop.drives.motion_record import KEPT, NOT_OURS, Course, MotionRecord, restart
+from multidrop.drives.motion_record import MOST_KEPT_COURSES, NOT_OURS, Course, MotionRecord, restart
 
 ME, OTHER, THIRD = "me", "other", "third"
 
@@ -151,9 +151,9 @@ def test_a_motion_of_another_sequence_replaces_the_open_ones_on_its_axis():
 
 
 def test_the_newest_motions_of_an_axis_are_kept():
-    courses = [course(number) for number in range(KEPT + 1)]
+    courses = [course(number) for number in range(MOST_KEPT_COURSES + 1)]
     record = recorded(*courses)
-    assert [each for number in range(KEPT + 1) for each in record.of(number)] == courses[1:]
+    assert [each for number in range(MOST_KEPT_COURSES + 1) for each in record.of(number)] == courses[1:]
 
 
 def test_a_program_may_have_moved_every_axis_and_a_motion_none():

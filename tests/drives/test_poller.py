@@ -9,10 +9,10 @@ import pytest
 from multidrop.base.errors import Inexpressible, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Kind, Motion, Priority, Reply, Request
 from multidrop.dialects.codec import End
-from multidrop.drives.events import Outcome, Sample, Silent, Transaction, Valued
+from multidrop.drives.events import ConversationOutcome, Sample, Silent, Transaction, Valued
 from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
-from multidrop.drives.readings import Seen
-from multidrop.drives.telemetry import Value, _MotionPoller, _ValuePoller
+from multidrop.drives.readings import MotionReading
+from multidrop.drives.telemetry import DriveValue, _MotionPoller, _ValuePoller
 from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
@@ -26,7 +26,7 @@ class Drive:
         self.address = self.shown = address
         self.transferring = False
         self.state = SimpleNamespace(programming=False, stranger="")
-        self.seen: Seen | None = None
+        self.seen: MotionReading | None = None
 
 
 class Reads(Poller[str]):
@@ -57,7 +57,7 @@ class Reads(Poller[str]):
             failure = self.fails.get(thing)
             if isinstance(failure, ValueError):
                 raise failure
-            outcome = Outcome(() if failure else (f"{thing}!",), failure, self.last, self.last)
+            outcome = ConversationOutcome(() if failure else (f"{thing}!",), failure, self.last, self.last)
             asyncio.get_running_loop().call_later(self.reply_after, over, outcome)
             return SimpleNamespace(interrupt=self._interrupt)
 
@@ -329,8 +329,8 @@ async def test_a_sample_has_what_was_read_and_the_velocity_that_the_places_show(
     [(priority, over)] = roster.at("a").asked
     assert priority is Priority.POLL
     axes = (Motion(5, 0, "x", "stalled", True), Motion(6, 1, "y"))
-    roster.at("a").seen = Seen(1.0, 7, (7, 1))
-    over(Outcome((axes,), None, None, transaction(End.DONE, at=3.0)))
+    roster.at("a").seen = MotionReading(1.0, 7, (7, 1))
+    over(ConversationOutcome((axes,), None, None, transaction(End.DONE, at=3.0)))
     assert link.events == []
     await asyncio.sleep(0)
     await asyncio.sleep(0)
@@ -362,7 +362,7 @@ async def test_a_drive_that_does_not_reply_to_a_poll_is_silent():
     poller.subscribe(["a"], 0.5)
     await asyncio.sleep(0.01)
     now = link.now()
-    roster.at("a").asked[0][1](Outcome((), NoAnswer("no reply")))
+    roster.at("a").asked[0][1](ConversationOutcome((), NoAnswer("no reply")))
     assert link.events == [Silent(now, "a")]
 
 
@@ -379,11 +379,11 @@ def values(*names: str) -> tuple[_ValuePoller, ToldLink, Any]:
 
 async def test_a_value_is_read_by_its_word_again_and_again():
     poller, link, roster = values("a")
-    poller.subscribe([Value("a", "I4")], 0.5)
+    poller.subscribe([DriveValue("a", "I4")], 0.5)
     await asyncio.sleep(0.01)
     [(procedure, over, typed)] = roster.at("a").asked
     assert (procedure, typed) == (("I4", Priority.POLL), True)
-    over(Outcome((2.5,), None, None, transaction(End.DONE, at=3.0)))
+    over(ConversationOutcome((2.5,), None, None, transaction(End.DONE, at=3.0)))
     assert link.events == [Valued(3.0, "a", "I4", 2.5)]
     await asyncio.sleep(0.5)
     assert len(roster.at("a").asked) == 2
@@ -391,34 +391,34 @@ async def test_a_value_is_read_by_its_word_again_and_again():
 
 async def test_a_value_that_is_refused_is_said_once_and_not_read_again():
     poller, link, roster = values("a")
-    poller.subscribe([Value("a", "I4")], 0.1)
+    poller.subscribe([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(0.01)
-    roster.at("a").asked[0][1](Outcome((), Refused("a: error 21")))
+    roster.at("a").asked[0][1](ConversationOutcome((), Refused("a: error 21")))
     await asyncio.sleep(60)
     assert link.told == [("a: error 21; it is not read again", "a", True)] and len(roster.at("a").asked) == 1
-    poller.subscribe([Value("a", "I4")], 0.1)
+    poller.subscribe([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(1)
     assert len(roster.at("a").asked) == 1
 
 
 async def test_a_subscription_that_begins_again_reads_a_refused_value_again():
     poller, link, roster = values("a")
-    subscription = poller.subscribe([Value("a", "I4")], 0.1)
+    subscription = poller.subscribe([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(0.01)
-    roster.at("a").asked[0][1](Outcome((), Refused("a: error 21")))
+    roster.at("a").asked[0][1](ConversationOutcome((), Refused("a: error 21")))
     subscription.close()
-    poller.subscribe([Value("a", "I4")], 0.1)
+    poller.subscribe([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(0.01)
     assert len(roster.at("a").asked) == 2
 
 
 async def test_a_value_that_gets_three_naks_in_a_row_counts_as_refused():
     poller, link, roster = values("a")
-    poller.subscribe([Value("a", "I4")], 0.1)
+    poller.subscribe([DriveValue("a", "I4")], 0.1)
     for number in range(3):
         await asyncio.sleep(4)
         assert len(roster.at("a").asked) == number + 1 and link.told == []
-        roster.at("a").asked[-1][1](Outcome((), NoAnswer("NAK"), None, transaction(End.NAK)))
+        roster.at("a").asked[-1][1](ConversationOutcome((), NoAnswer("NAK"), None, transaction(End.NAK)))
     await asyncio.sleep(60)
     assert link.told == [("a: NAK to 'I4'; it is not read again", "a", True)] and len(roster.at("a").asked) == 3
 
@@ -426,7 +426,7 @@ async def test_a_value_that_gets_three_naks_in_a_row_counts_as_refused():
 async def test_values_are_read_twenty_times_a_second_unless_another_period_is_asked_for():
     shop = await SimulatedBus(party("a")).open("a")
     for period, least, most in ((None, 18, 21), (0.5, 2, 3)):
-        value, before = Value("a", "VM"), len(shop.events)
+        value, before = DriveValue("a", "VM"), len(shop.events)
         telemetry = shop.bus.telemetry
         reading = telemetry.read([value]) if period is None else telemetry.read([value], period)
         await asyncio.sleep(1)

@@ -3,7 +3,7 @@
 import pytest
 
 from multidrop.dialects import Motion
-from multidrop.drives.readings import RECENT, REST, Judged, Seen
+from multidrop.drives.readings import LEAST_REST, RECENT, Judged, MotionReading
 
 
 def read(judged: Judged, at: float, *axes: tuple[int, int], in_place: bool = True):
@@ -13,8 +13,8 @@ def read(judged: Judged, at: float, *axes: tuple[int, int], in_place: bool = Tru
 def test_two_readings_of_one_place_confirm_the_rest_and_a_sooner_one_does_not():
     judged = Judged()
     assert not read(judged, 10.0, (5, 0)).at_rest()
-    assert not read(judged, 10.0 + REST / 2, (5, 0)).at_rest()
-    assert read(judged, 10.0 + REST, (5, 0)).at_rest()
+    assert not read(judged, 10.0 + LEAST_REST / 2, (5, 0)).at_rest()
+    assert read(judged, 10.0 + LEAST_REST, (5, 0)).at_rest()
 
 
 @pytest.mark.parametrize("between", [(6, 0), (5, 3)], ids=["another place", "a velocity"])
@@ -70,7 +70,7 @@ def test_without_that_a_place_must_stay_only_the_velocity_counts():
     ],
 )
 def test_a_rest_is_recent_or_later_than_the_time_that_is_given(confirms, since, at_rest):
-    assert Seen(9.0 + RECENT, 0, (0,), 10.0, confirms).at_rest(since) is at_rest
+    assert MotionReading(9.0 + RECENT, 0, (0,), 10.0, confirms).at_rest(since) is at_rest
 
 
 @pytest.mark.parametrize(("place", "velocity"), [(1, 1), (-1, -1), (0, 0), (2, 3)])
@@ -83,24 +83,24 @@ def test_the_slowest_way_has_a_velocity(place, velocity):
 def test_a_second_reading_at_the_same_time_has_the_velocity_that_was_read():
     judged = Judged()
     read(judged, 10.0, (0, 0))
-    assert read(judged, 10.0, (5, 0)) == Seen(10.0, 0, (0,), 10.0)
+    assert read(judged, 10.0, (5, 0)) == MotionReading(10.0, 0, (0,), 10.0)
 
 
 def test_a_drive_that_has_another_number_of_axes_is_judged_by_what_it_reads():
     judged = Judged()
     read(judged, 10.0, (0, 0))
-    assert read(judged, 10.1, (5, 0), (6, 0)) == Seen(10.1, 0, (0, 0), 10.1)
+    assert read(judged, 10.1, (5, 0), (6, 0)) == MotionReading(10.1, 0, (0, 0), 10.1)
 
 
 def test_the_fastest_axis_is_that_of_the_drive():
-    assert read(Judged(), 10.0, (0, 7), (0, -9)) == Seen(10.0, -9, (7, -9), 10.0)
+    assert read(Judged(), 10.0, (0, 7), (0, -9)) == MotionReading(10.0, -9, (7, -9), 10.0)
 
 
 def test_the_latest_reading_that_is_old_enough_confirms_a_rest():
     judged = Judged()
     for at in (10.0, 10.03, 10.06, 10.09):
         seen = read(judged, at, (5, 0))
-    assert seen == Seen(10.09, 0, (0,), 10.09, 10.03)
+    assert seen == MotionReading(10.09, 0, (0,), 10.09, 10.03)
     assert judged.still == [10.03, 10.06, 10.09]
     read(judged, 10.1, (5, 2))
     assert judged.still == []

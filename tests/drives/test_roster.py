@@ -13,7 +13,7 @@ from multidrop.dialects import Hints, Motion, Owed
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.events import Restarted
 from multidrop.drives.motion_record import MotionRecord
-from multidrop.drives.roster import PAUSE, Restarts, Roster, _compare, _shown, _text
+from multidrop.drives.roster import RETRY_PAUSE, Restarts, Roster, _compare, _shown, _text
 from multidrop.drives.roster import _ran_on as ran_on
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.state import MCodeState
@@ -314,10 +314,10 @@ async def test_a_homing_that_ends_well_gives_its_axis_a_reference(axis, anchored
     drive.state.reference_lost([axis, "z"])
     restarts, link, (a,) = looking(drive)
     restarts.homes(a, axis)
-    await asyncio.sleep(3 * PAUSE)
+    await asyncio.sleep(3 * RETRY_PAUSE)
     assert link.told == [] and axis in drive.state.unreferenced
     drive.axes = (at(5),)
-    await asyncio.sleep(2 * PAUSE)
+    await asyncio.sleep(2 * RETRY_PAUSE)
     assert link.told == [(text, "a", False)] and drive.state.unreferenced == {"z"}
 
 
@@ -338,7 +338,7 @@ async def test_another_homing_of_the_axis_takes_the_place_of_the_first_and_one_o
     restarts, link, (a,) = looking(drive)
     for axis in ("x", "x", "y"):
         restarts.homes(a, axis)
-    await asyncio.sleep(PAUSE)
+    await asyncio.sleep(RETRY_PAUSE)
     drive.axes = (at(5),)
     await asyncio.sleep(2)
     assert [text for text, *_ in link.told] == [

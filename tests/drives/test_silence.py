@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 
 from multidrop.base.errors import NoAnswer
-from multidrop.drives.echoes import Heard
+from multidrop.drives.echoes import FirstBytes
 from multidrop.drives.silence import ECHO, NETWORK, NOISE, SERIAL, explained, reason
 
 
 def link(came: bytes = b"", network: bool = False, other: str = "", suspects: str = "", written: bytes = b"") -> Any:
-    heard = Heard()
+    heard = FirstBytes()
     heard.received(came)
     heard.wrote(written)
     transport = SimpleNamespace(network=network, other_user=lambda: other, suspects=lambda: suspects)

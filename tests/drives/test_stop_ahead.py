@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.dialects import StopPiece
 from multidrop.drives import pacing
-from multidrop.drives.stop_ahead import AGAIN, StopAhead
+from multidrop.drives.stop_ahead import RETRY_AFTER, StopAhead
 from multidrop.drives.stop_forms import StopForms
 
 FORMS = StopForms(b"STOP", b"ST", (StopPiece(b"x", 0.3),), b"~", True)
@@ -96,7 +96,7 @@ def test_so_it_does_where_a_thread_has_gone_on_with_that_one(desk: Desk, left: f
 def test_a_piece_that_is_due_and_does_not_leave_is_tried_again_soon(desk: Desk) -> None:
     desk.line.only_stop, desk.line.transmitted, desk.owed = True, 4.8, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
-    assert desk.calls == [("after", AGAIN)]
+    assert desk.calls == [("after", RETRY_AFTER)]
 
 
 @pytest.mark.parametrize(("only_stop", "owed"), [(False, True), (True, False)])

@@ -10,18 +10,18 @@ from random import Random
 from types import SimpleNamespace
 
 import pytest
+from tests.drives.test_pmx import BYTE, Wire
 
 from multidrop.dialects import Hints, StopPiece
 from multidrop.drives import pacing
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Traffic
-from multidrop.drives.line import PAUSE, Line, Write, merged
+from multidrop.drives.line import LONG_QUIET, Line, Write, merged
 from multidrop.drives.stop_ahead import StopAhead
 from multidrop.drives.stop_forms import StopForms, stop_forms
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.pmx.host.codec import GAP, Pmx
+from multidrop.families.pmx.host.codec import STOP_PIECE_QUIET, Pmx
 from multidrop.simulator.serving.in_process import SimPipe
-from tests.drives.test_pmx import BYTE, Wire
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.simulated_bus import SimulatedBus
 
@@ -182,7 +182,7 @@ async def test_the_whole_stop_is_written_while_the_loop_is_held_up_from_before_t
     if keys == 1:
         assert [data for _, data in wire.written] == whole, "once, and no piece more"
     for (at, data), (after, _) in pairwise(wire.written):
-        assert after - at >= len(data) * BYTE + GAP, "the reply fits between"
+        assert after - at >= len(data) * BYTE + STOP_PIECE_QUIET, "the reply fits between"
     assert wire.collisions == []
     monkeypatch.undo()
     sent = []
@@ -379,7 +379,7 @@ class Counted:
 def ahead_of(wire, now, gap=0.02):
     """A stop in the pieces A, B and C, and its repetition; the time in which a piece leaves and its reply comes."""
     forms = StopForms(
-        *(b"A\r", b"A\r", (StopPiece(b"B\r", gap), StopPiece(b"C\r", gap), StopPiece(b"A\r", 2 * PAUSE))),
+        *(b"A\r", b"A\r", (StopPiece(b"B\r", gap), StopPiece(b"C\r", gap), StopPiece(b"A\r", 2 * LONG_QUIET))),
         *(b"", False),
         gap=gap,
     )

@@ -15,7 +15,7 @@ import pytest
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
-from multidrop.base.registry import Entry
+from multidrop.base.registry import FeatureEntry
 from multidrop.shell import hooks
 from multidrop.shell.configuration import Settings
 from multidrop.shell.hooks import Options
@@ -47,7 +47,7 @@ def add(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
     monkeypatch.setattr(registry, "_others", {})
 
     def added(*adds: object) -> None:
-        registry._others["p"] = Entry("x", "dist", "1", "p"), Feature("x", "adds options", adds=adds)
+        registry._others["p"] = FeatureEntry("x", "dist", "1", "p"), Feature("x", "adds options", adds=adds)
 
     yield added
 

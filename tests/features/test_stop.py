@@ -17,7 +17,7 @@ import pytest
 from multidrop.base import registry
 from multidrop.base.errors import Stopped
 from multidrop.base.feature import Feature
-from multidrop.base.registry import Entry
+from multidrop.base.registry import FeatureEntry
 from multidrop.cli import parse
 from multidrop.drives.events import Changed
 from multidrop.shell.at_session import AtSession
@@ -60,7 +60,7 @@ def add(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
     monkeypatch.setattr(registry, "_others", {})
 
     def added(*adds: object) -> None:
-        registry._others["p"] = Entry("x", "dist", "1", "p"), Feature("x", "tries to be in the way", adds=adds)
+        registry._others["p"] = FeatureEntry("x", "dist", "1", "p"), Feature("x", "tries to be in the way", adds=adds)
 
     yield added
 

@@ -7,27 +7,38 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, Parameter, Step, check, checked_values, escape, fill, filled, missing, value_names
+from multidrop.macros import (
+    Macro,
+    MacroParameter,
+    MacroStep,
+    check,
+    checked_values,
+    escape,
+    fill,
+    filled,
+    missing,
+    value_names,
+)
 
 
 def macro(*lines: str, on_early_end: tuple[str, ...] = ()) -> Macro:
-    return Macro("m", tuple(Step(0.0, line) for line in lines), on_early_end=on_early_end)
+    return Macro("m", tuple(MacroStep(0.0, line) for line in lines), on_early_end=on_early_end)
 
 
 @pytest.mark.parametrize(
     ("line", "parameter", "valid"),
     [
-        ("{n}", Parameter("n"), "one line of text"),
-        ("{n:int=10,1..100}", Parameter("n", "int", 10, 1, 100), "a whole number, 1 to 100"),
-        ("{n:int}", Parameter("n", "int"), "a whole number"),
-        ("{n: int = -5 , -10 .. }", Parameter("n", "int", -5, -10, None), "a whole number, -10 or more"),
-        ("{n:float,..2.5}", Parameter("n", "float", None, None, 2.5), "a number, 2.5 or less"),
-        ("{n:text=to, and..fro}", Parameter("n", "text", "to, and..fro"), "one line of text"),
-        ("{n:text=}", Parameter("n", "text", ""), "one line of text"),
-        ("{n:choice(a|b c)=b c}", Parameter("n", "choice", "b c", choices=("a", "b c")), "a or b c"),
+        ("{n}", MacroParameter("n"), "one line of text"),
+        ("{n:int=10,1..100}", MacroParameter("n", "int", 10, 1, 100), "a whole number, 1 to 100"),
+        ("{n:int}", MacroParameter("n", "int"), "a whole number"),
+        ("{n: int = -5 , -10 .. }", MacroParameter("n", "int", -5, -10, None), "a whole number, -10 or more"),
+        ("{n:float,..2.5}", MacroParameter("n", "float", None, None, 2.5), "a number, 2.5 or less"),
+        ("{n:text=to, and..fro}", MacroParameter("n", "text", "to, and..fro"), "one line of text"),
+        ("{n:text=}", MacroParameter("n", "text", ""), "one line of text"),
+        ("{n:choice(a|b c)=b c}", MacroParameter("n", "choice", "b c", choices=("a", "b c")), "a or b c"),
     ],
 )
-def test_a_line_says_type_default_and_limits(line: str, parameter: Parameter, valid: str) -> None:
+def test_a_line_says_type_default_and_limits(line: str, parameter: MacroParameter, valid: str) -> None:
     assert macro(line).parameters == (parameter,)
     assert parameter.valid == valid
 
@@ -54,7 +65,7 @@ def test_a_wrong_type_is_told_with_its_step(line: str, says: str) -> None:
 
 def test_a_plain_name_has_the_type_of_another_line() -> None:
     found = macro("VM {n}", "MR {n:int=7}", "{{n:x}}", on_early_end=("MA {n} {m}",)).parameters
-    assert found == (Parameter("n", "int", 7), Parameter("m"))
+    assert found == (MacroParameter("n", "int", 7), MacroParameter("m"))
 
 
 def test_the_name_of_a_set_line_is_no_parameter() -> None:
@@ -156,7 +167,7 @@ def test_a_line_that_cannot_be_filled_is_told(line: str, says: str) -> None:
     assert says in str(caught.value)
 
 
-ONE = (Step(0.0, "MR 1"),)
+ONE = (MacroStep(0.0, "MR 1"),)
 
 
 @pytest.mark.parametrize(
@@ -171,11 +182,11 @@ ONE = (Step(0.0, "MR 1"),)
         (Macro("a", ONE, key="F1"), "key 'F1'"),
         (Macro("a", ONE, key="F13"), "key 'F13'"),
         (Macro("a", ()), "without steps"),
-        (Macro("a", (*ONE, Step(-0.001, "x"))), "step 2: invalid after = -0.001"),
-        (Macro("a", (Step(float("nan"), "x"),)), "step 1: invalid after = nan"),
-        (Macro("a", (Step(float("inf"), "x"),)), "step 1: invalid after = inf"),
-        (Macro("a", (Step(0.0, "MR 1\nMR 2"),)), "more than one line"),
-        (Macro("a", (Step(0.0, "\ud800"),)), "half a character"),
+        (Macro("a", (*ONE, MacroStep(-0.001, "x"))), "step 2: invalid after = -0.001"),
+        (Macro("a", (MacroStep(float("nan"), "x"),)), "step 1: invalid after = nan"),
+        (Macro("a", (MacroStep(float("inf"), "x"),)), "step 1: invalid after = inf"),
+        (Macro("a", (MacroStep(0.0, "MR 1\nMR 2"),)), "more than one line"),
+        (Macro("a", (MacroStep(0.0, "\ud800"),)), "half a character"),
     ],
 )
 def test_a_macro_that_cannot_be_kept_is_told(macro: Macro, says: str) -> None:

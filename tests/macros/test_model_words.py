@@ -7,8 +7,8 @@ import pytest
 from multidrop.base.errors import Diagnostic
 from multidrop.macros import (
     Macro,
-    Parameter,
-    Step,
+    MacroParameter,
+    MacroStep,
     check,
     check_name,
     checked_values,
@@ -20,7 +20,7 @@ from multidrop.macros import (
 from multidrop.macros.model import describe_clash, written
 from tests.support.cases import for_each
 
-ONE = (Step(0.0, "MR 1"),)
+ONE = (MacroStep(0.0, "MR 1"),)
 
 
 def refusal(macro: Macro) -> str:
@@ -33,20 +33,22 @@ def refusal(macro: Macro) -> str:
 @for_each(
     "parameter, summary, example",
     [
-        (Parameter("n"), "n", "x"),
-        (Parameter("n", default=""), "n=", "x"),
-        (Parameter("n", default="to"), "n=to", "x"),
-        (Parameter("n", "int", 10, 1, 100), "n=10 (a whole number, 1 to 100)", "1"),
-        (Parameter("n", "int", 0), "n=0 (a whole number)", "0"),
-        (Parameter("n", "int", None, None, 7), "n (a whole number, 7 or less)", "0"),
-        (Parameter("n", "int", None, None, -7), "n (a whole number, -7 or less)", "-7"),
-        (Parameter("n", "int", None, 0), "n (a whole number, 0 or more)", "0"),
-        (Parameter("n", "float", 0.5, 0.0, 2.5), "n=0.5 (a number, 0 to 2.5)", "0"),
-        (Parameter("n", "float", 1e-7, 1e-7), "n=0.0000001 (a number, 0.0000001 or more)", "0.0000001"),
-        (Parameter("n", "choice", "b", choices=("a", "b")), "n=b (a or b)", "a"),
+        (MacroParameter("n"), "n", "x"),
+        (MacroParameter("n", default=""), "n=", "x"),
+        (MacroParameter("n", default="to"), "n=to", "x"),
+        (MacroParameter("n", "int", 10, 1, 100), "n=10 (a whole number, 1 to 100)", "1"),
+        (MacroParameter("n", "int", 0), "n=0 (a whole number)", "0"),
+        (MacroParameter("n", "int", None, None, 7), "n (a whole number, 7 or less)", "0"),
+        (MacroParameter("n", "int", None, None, -7), "n (a whole number, -7 or less)", "-7"),
+        (MacroParameter("n", "int", None, 0), "n (a whole number, 0 or more)", "0"),
+        (MacroParameter("n", "float", 0.5, 0.0, 2.5), "n=0.5 (a number, 0 to 2.5)", "0"),
+        (MacroParameter("n", "float", 1e-7, 1e-7), "n=0.0000001 (a number, 0.0000001 or more)", "0.0000001"),
+        (MacroParameter("n", "choice", "b", choices=("a", "b")), "n=b (a or b)", "a"),
     ],
 )
-def test_a_value_is_listed_with_its_default_and_what_is_valid(parameter: Parameter, summary: str, example: str) -> None:
+def test_a_value_is_listed_with_its_default_and_what_is_valid(
+    parameter: MacroParameter, summary: str, example: str
+) -> None:
     assert (parameter.summary, parameter.example) == (summary, example)
     parameter.take(example)
 
@@ -87,13 +89,13 @@ def test_a_number_is_written_without_an_exponent(value: int | float | str, text:
 )
 def test_numbers_are_taken_up_to_their_limits(kind: str, text: str, taken: int | float | None) -> None:
     try:
-        assert Parameter("n", kind).take(text, "here") == taken
+        assert MacroParameter("n", kind).take(text, "here") == taken
     except Diagnostic as problem:
         assert taken is None and str(problem).startswith(f"here: invalid n = '{text}'; valid: ")
 
 
 def test_limits_are_valid_values_themselves_and_digits_that_would_be_lost_are_told() -> None:
-    parameter = Parameter("n", "int", low=-5, high=5)
+    parameter = MacroParameter("n", "int", low=-5, high=5)
     assert [parameter.take(each) for each in ("-5", "5")] == [-5, 5]
     for each in ("-6", "6"):
         with pytest.raises(Diagnostic, match=f"invalid n = '{each}'; valid: a whole number, -5 to 5"):
@@ -101,33 +103,36 @@ def test_limits_are_valid_values_themselves_and_digits_that_would_be_lost_are_to
     with pytest.raises(
         Diagnostic, match=r"^here: n = 1234567.1234567890123 has more digits than are kept; as 1234567.1"
     ):
-        Parameter("n", "float").take("1234567.1234567890123", "here")
+        MacroParameter("n", "float").take("1234567.1234567890123", "here")
 
 
 @for_each(
     "line, parameter",
     [
-        ("{n:int,5..5}", Parameter("n", "int", None, 5, 5)),
-        ("{n:float=2,..}", Parameter("n", "float", 2.0)),
-        ("{n:choice( a | b )=a}", Parameter("n", "choice", "a", choices=("a", "b"))),
-        ("{n: text=1,2..3}", Parameter("n", "text", "1,2..3")),
-        ("{n:int = 3 , 1 .. 9}", Parameter("n", "int", 3, 1, 9)),
+        ("{n:int,5..5}", MacroParameter("n", "int", None, 5, 5)),
+        ("{n:float=2,..}", MacroParameter("n", "float", 2.0)),
+        ("{n:choice( a | b )=a}", MacroParameter("n", "choice", "a", choices=("a", "b"))),
+        ("{n: text=1,2..3}", MacroParameter("n", "text", "1,2..3")),
+        ("{n:int = 3 , 1 .. 9}", MacroParameter("n", "int", 3, 1, 9)),
     ],
 )
-def test_a_type_may_be_written_in_many_ways(line: str, parameter: Parameter) -> None:
-    assert Macro("m", (Step(0.0, line),)).parameters == (parameter,)
+def test_a_type_may_be_written_in_many_ways(line: str, parameter: MacroParameter) -> None:
+    assert Macro("m", (MacroStep(0.0, line),)).parameters == (parameter,)
 
 
 @for_each(
     "macro, told",
     [
         (
-            Macro("m", (*ONE, Step(0.0, "{n:choice(a|b),1..2}"))),
+            Macro("m", (*ONE, MacroStep(0.0, "{n:choice(a|b),1..2}"))),
             "m.toml:line.2: step 2: {n:choice(a|b),1..2}: invalid choi",
         ),
-        (Macro("m", (*ONE, Step(0.0, "{n:choice(a||b)}"))), "m.toml:line.2: step 2: {n:choice(a||b)}: invalid choices"),
         (
-            Macro("m", (Step(0.0, "{n:int}"),), on_early_end=("SL 0", "{n:float}")),
+            Macro("m", (*ONE, MacroStep(0.0, "{n:choice(a||b)}"))),
+            "m.toml:line.2: step 2: {n:choice(a||b)}: invalid choices",
+        ),
+        (
+            Macro("m", (MacroStep(0.0, "{n:int}"),), on_early_end=("SL 0", "{n:float}")),
             "m.toml:on_early_end.0: on_early_end 2: {n:float} differs from n in step 1; write {n} in one of them, or "
             "the same type in both",
         ),
@@ -141,20 +146,23 @@ def test_a_type_may_be_written_in_many_ways(line: str, parameter: Parameter) -> 
         (Macro("m", ONE, roles=("a b",)), "m.toml:roles.0: invalid role 'a b'; use letters, digits, - and _"),
         (Macro("m", ONE, roles=("a", "b", "a")), "m.toml:roles.0: a role is named twice; name each role once"),
         (
-            Macro("m", (Step(0.0, "{b} {a}"),), roles=("a", "b")),
+            Macro("m", (MacroStep(0.0, "{b} {a}"),), roles=("a", "b")),
             "m.toml:roles.0: a is a role and a value; give one of them another name",
         ),
         (
-            Macro("m", (*ONE, Step(0.0, "a\rb"))),
+            Macro("m", (*ONE, MacroStep(0.0, "a\rb"))),
             "m.toml:line.2: step 2: more than one line of text; give each line a [[",
         ),
-        (Macro("m", (*ONE, Step(-1.0, "x"))), "m.toml:after.2: step 2: invalid after = -1.0; valid: 0.0 s or more"),
         (
-            Macro("m", (*ONE, Step(0.0, "x", "\ud800"))),
+            Macro("m", (*ONE, MacroStep(-1.0, "x"))),
+            "m.toml:after.2: step 2: invalid after = -1.0; valid: 0.0 s or more",
+        ),
+        (
+            Macro("m", (*ONE, MacroStep(0.0, "x", "\ud800"))),
             "m.toml:replies.2: step 2: what was recorded: half a character at position 1",
         ),
         (
-            Macro("m", (*ONE, Step(0.0, "x", "", ("ok", "no\ud800")))),
+            Macro("m", (*ONE, MacroStep(0.0, "x", "", ("ok", "no\ud800")))),
             "m.toml:replies.2: step 2: what was recorded: half a character at position 3",
         ),
         (Macro("m", ONE, on_early_end=("SL 0", "a\nb")), "m.toml:on_early_end.0: on_early_end 2: more than one line"),
@@ -170,7 +178,7 @@ def test_a_macro_of_all_parts_is_right() -> None:
     check(
         Macro(
             "a" * 64,
-            (Step(0.0, "@press:a MR {n:int=1}", "press:a", ("ok",)),),
+            (MacroStep(0.0, "@press:a MR {n:int=1}", "press:a", ("ok",)),),
             "F12",
             "a note",
             "page-of_16-chars",
@@ -208,7 +216,7 @@ def test_a_device_of_windows_is_no_name_there(name: str, monkeypatch: pytest.Mon
         (Macro("m", ONE, "F3", page="2"), "F3 (page 2)", "", "m                F3 (page 2) 1 line"),
         (Macro("m", ONE, page="2"), "", "", "m                -    1 line"),
         (
-            Macro("a-name-of-17-char", (Step(0.0, "{n:int=1} {m}"),), roles=("press", "gantry"), note="x"),
+            Macro("a-name-of-17-char", (MacroStep(0.0, "{n:int=1} {m}"),), roles=("press", "gantry"), note="x"),
             "",
             "values: n=1 (a whole number), m  roles: press, gantry",
             "a-name-of-17-char -    1 line  values: n=1 (a whole number), m  roles: press, gantry  x",
@@ -251,7 +259,7 @@ def test_macros_on_one_key_are_named(names: list[str], told: str) -> None:
 )
 def test_values_that_do_not_fit_are_told_with_the_step(lines: list[str], given: dict[str, str], told: str) -> None:
     with pytest.raises(Diagnostic) as caught:
-        checked_values(Macro("m", tuple(Step(0.0, line) for line in lines)), given)
+        checked_values(Macro("m", tuple(MacroStep(0.0, line) for line in lines)), given)
     assert str(caught.value).startswith(told)
 
 
@@ -272,7 +280,7 @@ def test_values_that_do_not_fit_are_told_with_the_step(lines: list[str], given: 
 )
 def test_a_value_that_is_a_quantity_is_in_braces_but_in_a_text(line: str, given: dict[str, str], played: str) -> None:
     assert fill(line, given) == played
-    assert filled(Macro("m", (Step(0.0, line),)), given) == (played,)
+    assert filled(Macro("m", (MacroStep(0.0, line),)), given) == (played,)
 
 
 def test_a_lone_brace_is_told_with_its_column_and_how_to_write_one() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, Recorder, Step
+from multidrop.macros import Macro, MacroStep, Recorder
 from multidrop.macros.recorder import Observed, offers, with_waits
 
 
@@ -78,9 +78,9 @@ def test_a_wait_takes_the_place_of_the_pause() -> None:
     (offer,) = recorder.offers
     assert offer.text == "before step 2, /wait stopped 13 for the pause of 4.2 s"
     assert with_waits(recorder.macro(), [offer]).steps == (
-        Step(0.0, "MR 51200"),
-        Step(0.0, "/wait stopped 13"),
-        Step(0.0, "PR P"),
+        MacroStep(0.0, "MR 51200"),
+        MacroStep(0.0, "/wait stopped 13"),
+        MacroStep(0.0, "PR P"),
     )
 
 
@@ -97,7 +97,7 @@ def test_what_came_back_is_kept_beside_the_step_and_cut() -> None:
 
 def test_no_events_and_no_lines_are_no_offers() -> None:
     assert offers([], Observed()) == []
-    assert with_waits(Macro("m", (Step(1.0, "PR P"),)), []) == Macro("m", (Step(1.0, "PR P"),))
+    assert with_waits(Macro("m", (MacroStep(1.0, "PR P"),)), []) == Macro("m", (MacroStep(1.0, "PR P"),))
 
 
 def typed(*kept: tuple[str, float], start: float = 0.0) -> Macro:
@@ -110,7 +110,7 @@ def typed(*kept: tuple[str, float], start: float = 0.0) -> Macro:
 
 def test_a_recording_begins_with_its_first_line_in_milliseconds() -> None:
     macro = typed(("@b MR 1", 7.0), ("/wait stopped", 7.1234), ("PR P", 9.0), start=2.0)
-    assert macro == Macro("m", (Step(0.0, "@b MR 1"), Step(0.123, "/wait stopped"), Step(1.877, "PR P")))
+    assert macro == Macro("m", (MacroStep(0.0, "@b MR 1"), MacroStep(0.123, "/wait stopped"), MacroStep(1.877, "PR P")))
 
 
 def test_rounding_does_not_add_up() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, Recorder, Step
-from multidrop.macros.recorder import KEPT, Observed, Offer, with_waits
+from multidrop.macros import Macro, MacroStep, Recorder
+from multidrop.macros.recorder import MOST_KEPT_EVENTS, Observed, WaitOffer, with_waits
 from tests.support.cases import for_each
 
 
@@ -130,21 +130,28 @@ def test_two_hundred_characters_of_a_reply_are_kept() -> None:
 
 def test_of_a_long_recording_the_last_events_are_kept() -> None:
     observed = Observed()
-    for number in range(KEPT + 5):
+    for number in range(MOST_KEPT_EVENTS + 5):
         observed.texts.append((float(number), ""))
         observed.inputs.append((float(number), ""))
         observed.moving.append((float(number), True))
-    assert KEPT == 10_000
+    assert MOST_KEPT_EVENTS == 10_000
     for each in (observed.texts, observed.inputs, observed.moving):
-        assert (len(each), each[0][0]) == (KEPT, 5.0)
+        assert (len(each), each[0][0]) == (MOST_KEPT_EVENTS, 5.0)
 
 
 def test_a_wait_stands_before_its_step_with_its_braces_doubled() -> None:
-    macro = Macro("m", (Step(0.0, "MR 1"), Step(4.2, "PR P", "a", ("1",)), Step(1.5, "PR V")), "F3", "note")
-    found = with_waits(macro, [Offer(2, '/wait "{x}"', 4.2)])
+    macro = Macro(
+        "m", (MacroStep(0.0, "MR 1"), MacroStep(4.2, "PR P", "a", ("1",)), MacroStep(1.5, "PR V")), "F3", "note"
+    )
+    found = with_waits(macro, [WaitOffer(2, '/wait "{x}"', 4.2)])
     assert found == Macro(
         "m",
-        (Step(0.0, "MR 1"), Step(0.0, '/wait "{{x}}"'), Step(0.0, "PR P", "a", ("1",)), Step(1.5, "PR V")),
+        (
+            MacroStep(0.0, "MR 1"),
+            MacroStep(0.0, '/wait "{{x}}"'),
+            MacroStep(0.0, "PR P", "a", ("1",)),
+            MacroStep(1.5, "PR V"),
+        ),
         "F3",
         "note",
     )
@@ -159,7 +166,7 @@ def test_a_recording_takes_lines_and_events_only_until_it_is_stored() -> None:
     recorder.observed.texts.append((2.0, "said"))
     with pytest.raises(Diagnostic, match="^the macro m is being recorded; stop that recording first$"):
         recorder.start("n", 3.0)
-    assert recorder.macro() == Macro("m", (Step(0.0, "PR {{x}}", "press:a"),), recorded="2026-11-29")
+    assert recorder.macro() == Macro("m", (MacroStep(0.0, "PR {{x}}", "press:a"),), recorded="2026-11-29")
     recorder.discard()
     assert (recorder.name, recorder.before) == ("", None)
     with pytest.raises(Diagnostic, match="^no macro is being recorded; start one first$"):
@@ -170,7 +177,7 @@ def test_a_recording_takes_lines_and_events_only_until_it_is_stored() -> None:
         recorder.macro()
     recorder.start("again", 5.0)
     recorder.record("PR 1", 6.0)
-    assert recorder.macro() == Macro("again", (Step(0.0, "PR 1"),))
+    assert recorder.macro() == Macro("again", (MacroStep(0.0, "PR 1"),))
 
 
 def test_lines_that_were_typed_in_one_moment_or_out_of_order_have_no_negative_pause() -> None:

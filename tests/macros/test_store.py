@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
+from multidrop.macros import Macro, MacroStep, MacroStore, format_macro, parse_macro
 from multidrop.macros.store import listed
 from multidrop.macros.toml_format import quoted, with_values
 
-SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
+SHUTTLE = Macro("shuttle", (MacroStep(0.0, "@b EX Ga"), MacroStep(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
 GOOD = 'name = "a"\n[[step]]\nafter = 0\nline = "MR 1"\n'
 
 
@@ -45,8 +45,8 @@ LINES = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\n\
 TIMES = st.floats(min_value=0.0, allow_infinity=False, allow_nan=False)
 
 
-@given(st.lists(st.builds(Step, TIMES, LINES), min_size=1), st.text(st.characters(exclude_categories=["Cs"])))
-def test_any_line_survives_the_file(steps: list[Step], note: str) -> None:
+@given(st.lists(st.builds(MacroStep, TIMES, LINES), min_size=1), st.text(st.characters(exclude_categories=["Cs"])))
+def test_any_line_survives_the_file(steps: list[MacroStep], note: str) -> None:
     macro = Macro("m", tuple(steps), "F12", note)
     text = format_macro(macro)
     assert all(char == "\n" or char.isprintable() for char in text)
@@ -112,7 +112,7 @@ def test_a_file_that_is_no_utf_8_is_told_with_its_line(store: MacroStore) -> Non
 
 def test_a_byte_order_mark_and_windows_line_ends_are_read(store: MacroStore) -> None:
     put(store, "a", b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
-    assert store.load("a").steps == (Step(0.0, "MR 1"),)
+    assert store.load("a").steps == (MacroStep(0.0, "MR 1"),)
 
 
 def test_a_file_under_another_name_is_told(store: MacroStore) -> None:
@@ -199,7 +199,7 @@ def test_a_full_disk_leaves_the_old_macro_and_no_litter(store: MacroStore, monke
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
         with pytest.raises(Diagnostic, match=r"shuttle\.toml: cannot write the file \(No space left on device\)"):
-            store.save(Macro("shuttle", (Step(0.0, "MR 2"),)), before)
+            store.save(Macro("shuttle", (MacroStep(0.0, "MR 2"),)), before)
     assert store.path("shuttle").read_bytes() == before
     assert os.listdir(store.folder) == ["shuttle.toml"]
 
@@ -212,7 +212,7 @@ def test_a_write_that_stops_halfway_leaves_the_old_macro_and_no_litter(store: Ma
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
     try:
         with pytest.raises(Diagnostic, match="cannot write the file"):
-            store.save(Macro("shuttle", (Step(0.0, "MR 2" * 100),)), before)
+            store.save(Macro("shuttle", (MacroStep(0.0, "MR 2" * 100),)), before)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert store.path("shuttle").read_bytes() == before
@@ -302,7 +302,7 @@ def test_a_key_goes_into_any_form_of_file(store: MacroStore, text: str) -> None:
 @given(st.text(st.sampled_from('#" \n\r\t=[]x\u2028\u00e9'), max_size=30), st.text(max_size=20))
 def test_remarks_anywhere_survive_a_change_of_the_key(remark: str, note: str) -> None:
     lines = re.split(r"[\r\n]+", remark)
-    text = "".join(f"# {line}\n" for line in lines) + format_macro(Macro("a", (Step(0.0, "MR 1"),), "F2", "x"))
+    text = "".join(f"# {line}\n" for line in lines) + format_macro(Macro("a", (MacroStep(0.0, "MR 1"),), "F2", "x"))
     text += "".join(f"#{line}\r\n" for line in lines)
     try:
         parse_macro(text)
@@ -344,11 +344,11 @@ def test_a_file_keeps_its_mode_and_a_linked_one_too(store: MacroStore, tmp_path:
 def test_a_macro_takes_the_place_of_what_was_there_when_it_was_asked_for_only(store: MacroStore) -> None:
     store.save(SHUTTLE)
     with pytest.raises(Diagnostic, match=r"shuttle\.toml: the file exists already"):
-        store.save(Macro("shuttle", (Step(0.0, "MR 2"),)))
+        store.save(Macro("shuttle", (MacroStep(0.0, "MR 2"),)))
     before = store.contents("shuttle")
     put(store, "shuttle", WRITTEN.encode())
     with pytest.raises(Diagnostic, match=r"shuttle\.toml: the file has changed meanwhile"):
-        store.save(Macro("shuttle", (Step(0.0, "MR 2"),)), before)
+        store.save(Macro("shuttle", (MacroStep(0.0, "MR 2"),)), before)
     assert store.contents("shuttle") == WRITTEN.encode()
     assert store.free_name("shuttle") == "shuttle-2"
 

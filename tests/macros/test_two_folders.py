@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
+from multidrop.macros import Macro, MacroStep, MacroStore, format_macro, parse_macro
 from multidrop.macros.store import listed
 from multidrop.macros.toml_format import quoted, with_values
 from tests.support.cases import for_each
 
-ONE = (Step(0.0, "MR 1"),)
+ONE = (MacroStep(0.0, "MR 1"),)
 TEXT = '# mine\nname = "{0}"\nkey = "{1}"\nnote = "n"\n[[step]]\nline = "MR 1" # far\n'
 
 
@@ -224,7 +224,7 @@ def test_a_file_that_changes_in_the_moment_of_a_change_stays(
 def test_a_file_of_all_parts_is_written_as_a_person_would() -> None:
     macro = Macro(
         "a",
-        (Step(1, "MR 1", "press:a", ("ok",)), Step(0.5, "PR P", "", ("5", "> "))),
+        (MacroStep(1, "MR 1", "press:a", ("ok",)), MacroStep(0.5, "PR P", "", ("5", "> "))),
         "F3",
         "note",
         "2",

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.macros.vendor import REMARK, exported, imported
 
 
@@ -49,18 +49,18 @@ def test_a_day_and_ten_thousand_lines_are_the_most() -> None:
         with pytest.raises(Diagnostic) as caught:
             steps(text)
         assert str(caught.value).startswith(says)
-    day = Macro("f2", (Step(86400.0, "H"),))
+    day = Macro("f2", (MacroStep(86400.0, "H"),))
     assert exported([day]) == "F2 ^d86400000H^M\n"
     with pytest.raises(Diagnostic, match="a pause of 86400 s has no counterpart"):
-        exported([Macro("f2", (Step(86400.001, "H"),))])
+        exported([Macro("f2", (MacroStep(86400.001, "H"),))])
 
 
 def test_comments_blank_lines_and_keys() -> None:
     text = "; shuttle\r\nF2 MR 1^M ; there ; and back\r\n\n# old\nf12 H^M ;\nF13 PR P^M\n"
     assert imported(text, "keys.txt") == [
-        Macro("f2", (Step(0.0, "MR 1"),), "F2", "there ; and back"),
-        Macro("f12", (Step(0.0, "H"),), "F12"),
-        Macro("f13", (Step(0.0, "PR P"),)),
+        Macro("f2", (MacroStep(0.0, "MR 1"),), "F2", "there ; and back"),
+        Macro("f12", (MacroStep(0.0, "H"),), "F12"),
+        Macro("f13", (MacroStep(0.0, "PR P"),)),
     ]
 
 
@@ -109,17 +109,17 @@ def test_what_has_no_counterpart_is_told_with_its_place(text: str, says: str) ->
 @pytest.mark.parametrize(
     ("macro", "says"),
     [
-        (Macro("m", (Step(0, "H"),)), "macro m: it is on no function key; /key F3 m gives it one"),
-        (Macro("f2", (Step(0, "@b MR 1"),)), "macro f2, step 1: '@b MR 1' has no counterpart"),
-        (Macro("f2", (Step(0, "/wait stopped"),)), "'/wait stopped' has no counterpart"),
-        (Macro("f2", (Step(0, "PR ^x"),)), "has no counterpart"),
-        (Macro("f2", (Step(0, "A ; b"),)), "has no counterpart"),
-        (Macro("f2", (Step(0, "MR {n}"),)), "a value has no counterpart"),
-        (Macro("f2", (Step(0, "MR 1"),), roles=("a",)), "a role has no counterpart"),
-        (Macro("f2", (Step(0, "MR 1"),), on_early_end=("H",)), "on_early_end has no counterpart"),
-        (Macro("f2", (Step(0.0001, "MR 1"),)), "a pause of 0.0001 s has no counterpart"),
-        (Macro("f2", (Step(0.001, "1"),)), "a pause of 1 ms before a digit"),
-        (Macro("f2", (Step(0, "/play f3"), Step(0, "5"))), "a line that begins with a digit after ^f"),
+        (Macro("m", (MacroStep(0, "H"),)), "macro m: it is on no function key; /key F3 m gives it one"),
+        (Macro("f2", (MacroStep(0, "@b MR 1"),)), "macro f2, step 1: '@b MR 1' has no counterpart"),
+        (Macro("f2", (MacroStep(0, "/wait stopped"),)), "'/wait stopped' has no counterpart"),
+        (Macro("f2", (MacroStep(0, "PR ^x"),)), "has no counterpart"),
+        (Macro("f2", (MacroStep(0, "A ; b"),)), "has no counterpart"),
+        (Macro("f2", (MacroStep(0, "MR {n}"),)), "a value has no counterpart"),
+        (Macro("f2", (MacroStep(0, "MR 1"),), roles=("a",)), "a role has no counterpart"),
+        (Macro("f2", (MacroStep(0, "MR 1"),), on_early_end=("H",)), "on_early_end has no counterpart"),
+        (Macro("f2", (MacroStep(0.0001, "MR 1"),)), "a pause of 0.0001 s has no counterpart"),
+        (Macro("f2", (MacroStep(0.001, "1"),)), "a pause of 1 ms before a digit"),
+        (Macro("f2", (MacroStep(0, "/play f3"), MacroStep(0, "5"))), "a line that begins with a digit after ^f"),
     ],
 )
 def test_what_cannot_be_exported_is_told(macro: Macro, says: str) -> None:
@@ -130,7 +130,7 @@ def test_what_cannot_be_exported_is_told(macro: Macro, says: str) -> None:
 
 def test_two_macros_on_a_key_are_not_exported() -> None:
     with pytest.raises(Diagnostic, match="F2 is taken by another macro"):
-        exported([Macro("f2", (Step(0, "H"),)), Macro("m", (Step(0, "H"),), "F2")])
+        exported([Macro("f2", (MacroStep(0, "H"),)), Macro("m", (MacroStep(0, "H"),), "F2")])
 
 
 @pytest.mark.parametrize(
@@ -138,12 +138,14 @@ def test_two_macros_on_a_key_are_not_exported() -> None:
     [(0.05, "^m"), (1, "^p"), (5, "^p^p^p^p^p"), (5.95, "^p" * 5 + "^m" * 19), (6, "^d6000"), (0.01, "^d10")],
 )
 def test_a_pause_up_to_six_seconds_is_spelt_out_in_seconds_and_twentieths(seconds: float, pause: str) -> None:
-    macro = Macro("f3", [Step(0, "H"), Step(0, f"/sleep {seconds}"), Step(0, "PR P")], "F3")
+    macro = Macro("f3", [MacroStep(0, "H"), MacroStep(0, f"/sleep {seconds}"), MacroStep(0, "PR P")], "F3")
     assert exported([macro]) == f"F3 H^M{pause}PR P^M\n"
 
 
 def test_sleeps_become_pauses() -> None:
-    macro = Macro("m", (Step(0, "H"), Step(0, "/sleep 1.5"), Step(0.5, "PR P"), Step(7, "5")), "F3", "a note")
+    macro = Macro(
+        "m", (MacroStep(0, "H"), MacroStep(0, "/sleep 1.5"), MacroStep(0.5, "PR P"), MacroStep(7, "5")), "F3", "a note"
+    )
     assert exported([macro]) == "F3 H^M^p^m^m^m^m^m^m^m^m^m^mPR P^M^d6950^m5^M ; a note\n"
 
 
@@ -180,7 +182,7 @@ AFTER = st.integers(0, 200_000).map(lambda milliseconds: milliseconds / 1000)
 )
 def test_an_exported_macro_is_imported_as_it_was(lines: list[tuple[float, str]], note: str) -> None:
     macro = Macro(
-        "f2", tuple(Step(after, line.replace("{", "{{").replace("}", "}}")) for after, line in lines), "F2", note
+        "f2", tuple(MacroStep(after, line.replace("{", "{{").replace("}", "}}")) for after, line in lines), "F2", note
     )
     try:
         text = exported([macro])

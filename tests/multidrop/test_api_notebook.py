@@ -15,7 +15,7 @@ import pytest
 
 from multidrop import Diagnostic, Session, TransportLost, connect, read_rrd
 from multidrop.api import threads
-from multidrop.api.threads import Ended, LoopThread
+from multidrop.api.threads import LoopEnded, LoopThread
 from tests.support.cell_session import bus, moves, party
 from tests.support.foreign_features import delete_features
 from tests.support.virtual import VirtualLoop
@@ -134,5 +134,5 @@ def test_work_that_begins_with_the_end_of_its_loop_is_refused_or_cancelled() -> 
     loop.end()
     with pytest.raises(concurrent.futures.CancelledError):
         begun.result(10)
-    with pytest.raises(Ended):
+    with pytest.raises(LoopEnded):
         loop.begin(endless())

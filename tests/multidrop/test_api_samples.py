@@ -55,7 +55,7 @@ async def test_telemetry_of_all_drives_names_them_and_their_axes(url: str) -> No
 
 @pytest.mark.virtual
 async def test_samples_that_nobody_takes_are_bounded_and_counted(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(telemetry, "KEPT", 5)
+    monkeypatch.setattr(telemetry, "MOST_KEPT_SAMPLES", 5)
     async with connect_async(f"{url}#press") as session:
         opened = session.telemetry("a")
         await asyncio.sleep(1)

@@ -97,7 +97,7 @@ def test_pieces_of_several_buses_and_after_an_end_of_line_stay_apart(tmp_path):
 @pytest.fixture
 def waited_for(monkeypatch):
     """An entry is written before `put` returns, however busy the machine is."""
-    monkeypatch.setattr("multidrop.shell.log.writer.PATIENCE", PATIENCE)
+    monkeypatch.setattr("multidrop.shell.log.writer.WRITE_TIMEOUT", PATIENCE)
 
 
 @pytest.mark.usefixtures("waited_for")

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.commands.log import LONGEST, Following, joined, text
-from multidrop.shell.log.files import Entry, Line, line_of, whole
+from multidrop.commands.log import LONGEST_JOINED_TEXT, Following, joined, text
+from multidrop.shell.log.files import LogEntry, LogLine, line_of, whole
 from tests.support.cases import for_each
 from tests.support.log_entries import BEGIN, POLLS, PRINTED, STOP, TYPED, Done, entry, log_command, newest_log, put
 
@@ -59,15 +59,15 @@ def test_entries_are_chosen_by_drive_or_by_bus_and_drive(
     (entry("printed", "x", "p\x1b"), r"<  p\x1b:b x"),
     (entry("log", "session", "", ""), "*  session"),
 ])  # fmt: skip
-def test_an_entry_is_one_line_with_its_sign_and_its_place(kind: Entry, line: str) -> None:
+def test_an_entry_is_one_line_with_its_sign_and_its_place(kind: LogEntry, line: str) -> None:
     assert text(kind) == f"2026-11-22 12:41:06.020 {line}"
 
 
-def replies(*pieces: Entry) -> list[str]:
-    return [each.entry.text for each in joined(Line(Path("log"), 1, b"", each) for each in pieces) if each.entry]
+def replies(*pieces: LogEntry) -> list[str]:
+    return [each.entry.text for each in joined(LogLine(Path("log"), 1, b"", each) for each in pieces) if each.entry]
 
 
-def received(text: str, **more: Any) -> Entry:
+def received(text: str, **more: Any) -> LogEntry:
     return entry("received", text, **more)
 
 
@@ -78,8 +78,11 @@ def test_the_pieces_of_one_reply_are_one_line_until_its_end() -> None:
     assert replies(received("1"), received("2", drive="a")) == ["1", "2"]
     assert replies(received("1"), received("2", bus="x")) == ["1", "2"]
     assert replies(received("1"), received("2", after=1.0)) == ["12"]
-    assert replies(*[received("x" * (LONGEST - 1)), received("y"), received("z")]) == ["x" * (LONGEST - 1) + "y", "z"]
-    [found] = joined(Line(Path("log"), n, b"", received(f"{n}", after=n)) for n in (1, 2))
+    assert replies(*[received("x" * (LONGEST_JOINED_TEXT - 1)), received("y"), received("z")]) == [
+        "x" * (LONGEST_JOINED_TEXT - 1) + "y",
+        "z",
+    ]
+    [found] = joined(LogLine(Path("log"), n, b"", received(f"{n}", after=n)) for n in (1, 2))
     assert found.entry is not None and found.number == 1
     assert text(found.entry) == "2026-11-22 12:41:07.020 << press:b 12"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
 
@@ -86,7 +86,7 @@ def test_a_reader_that_has_its_last_line_is_a_good_end(home):
 )
 def test_a_reader_that_leaves_ends_what_prints(home, arguments):
     home.file("endless.mxt", 'PG 1\nLB G1\nPR "begun"\nLB G2\nR1=1\nBR G2\nE\nPG\n')
-    home.file("day.jsonl", line_of(Entry(datetime(2026, 1, 1, tzinfo=UTC), "typed", "PR P")))
+    home.file("day.jsonl", line_of(LogEntry(datetime(2026, 1, 1, tzinfo=UTC), "typed", "PR P")))
     assert left(home, *arguments) == (141, "")
 
 

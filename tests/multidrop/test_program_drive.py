@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.families.pmx.manual.script_compiler import LINES
+from multidrop.families.pmx.manual.script_compiler import MEMORY_LINES
 from tests.support.cell_session import TCP, bus, drive, pmx
 from tests.support.front_door import Command, Home
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, plain
@@ -38,7 +38,7 @@ def test_files_that_are_right_are_exit_0_and_say_how_much_memory_they_take(progr
     assert done.returncode == 0 and done.stderr == ""
     assert done.stdout.splitlines() == [
         "a.mxt: nothing wrong, 5 lines of program",
-        f"a.prg: nothing wrong, 23 of {LINES} compiled lines",
+        f"a.prg: nothing wrong, 23 of {MEMORY_LINES} compiled lines",
     ]
 
 
@@ -107,7 +107,7 @@ def test_bare_lines_are_checked_run_downloaded_and_come_back_as_the_program(
 ) -> None:
     (tmp_path / "bare.prg").write_text("; V10=V1*10, until it is 1000\nPS0\nCV1\nVR10\nAM\nVR10\nCV1000\nJW2$2\nJR6\n"
                                        "CV10\nVR10\nVR10\nOX3\nJM-6\nXX\n")  # fmt: skip
-    assert program("check", "bare.prg").stdout == f"bare.prg: nothing wrong, 14 of {LINES} compiled lines\n"
+    assert program("check", "bare.prg").stdout == f"bare.prg: nothing wrong, 14 of {MEMORY_LINES} compiled lines\n"
     assert program("test", "bare.prg").returncode == 0
     url = served["pmx"] + "?dialect=pmx&drives=07"
     assert program("download", url, "bare.prg").returncode == 0

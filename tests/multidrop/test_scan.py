@@ -12,7 +12,7 @@ from multidrop.base.errors import TransportLost
 from multidrop.commands import scan
 from multidrop.shell.connect.scheme import Scheme
 from multidrop.shell.finding.scanning import Scanning
-from multidrop.shell.prompt.terminal_input import PAUSE
+from multidrop.shell.prompt.terminal_input import TYPING_PAUSE
 from tests.support.front_door import read_to_end
 
 CELL = '[[bus]]\nname = "press"\n[[bus.drive]]\npersonality = "LMDCM"\n'
@@ -139,7 +139,7 @@ def test_the_stop_key_in_a_search_stops_the_modules_that_were_asked(home):
     assert home.run("send", url, "@1 ROR 0, 500", "@30 ROR 2, 500", "@40 ROR 0, 500", "@200 ROR 0, 500").returncode == 0
     child = home.terminal("scan", home.endpoints["slide"]["tcp"], "--dialect", "tmcl", "--all", columns=200)
     child.expect(r"LF, CR and ESC to them. Go on\? \[y/N\]")
-    time.sleep(2 * PAUSE)  # the pause itself: from here on a key counts
+    time.sleep(2 * TYPING_PAUSE)  # the pause itself: from here on a key counts
     child.send("y")
     child.expect("40  TMCM-1241")
     child.send("\x18")

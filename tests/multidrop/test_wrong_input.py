@@ -32,7 +32,7 @@ from multidrop.shell.configuration import Settings
 from multidrop.shell.connect import urls
 from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
-from multidrop.shell.streams.stdout import LONGEST, report, shortened
+from multidrop.shell.streams.stdout import LONGEST_PROBLEM_TEXT, report, shortened
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 from tests.support.front_door import Command
@@ -64,7 +64,7 @@ def told(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest
         assert main(arguments) == code, arguments
         err = capsys.readouterr().err
         assert err.count("\n") == 1 and err.endswith("\n") and "Traceback" not in err
-        assert len(err) <= LONGEST + 100 and "set_int_max_str_digits" not in err
+        assert len(err) <= LONGEST_PROBLEM_TEXT + 100 and "set_int_max_str_digits" not in err
         return err
 
     return run
@@ -362,7 +362,7 @@ def test_a_nasty_line_is_carried_out_or_told(
                 async with asyncio.timeout(10_000):
                     await session.run(line)
             except FAILURES as failure:
-                assert "\n" not in report(failure) and len(report(failure)) <= LONGEST + 2
+                assert "\n" not in report(failure) and len(report(failure)) <= LONGEST_PROBLEM_TEXT + 2
             for name in [each for each in session.buses if each != "l"]:
                 await session.forget(session.bus(name))
         await session.close()
@@ -381,6 +381,10 @@ def test_help_and_hints_take_any_text(language: Language) -> None:
 
 
 def test_a_message_keeps_its_beginning_and_its_end() -> None:
-    assert shortened("a" * LONGEST) == "a" * LONGEST
+    assert shortened("a" * LONGEST_PROBLEM_TEXT) == "a" * LONGEST_PROBLEM_TEXT
     short = shortened(f"x.toml: {'b' * 5000} is no number; write 1 to 5")
-    assert short.startswith("x.toml: bbb") and short.endswith("b is no number; write 1 to 5") and len(short) <= LONGEST
+    assert (
+        short.startswith("x.toml: bbb")
+        and short.endswith("b is no number; write 1 to 5")
+        and len(short) <= LONGEST_PROBLEM_TEXT
+    )

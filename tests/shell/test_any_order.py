@@ -22,7 +22,7 @@ from hypothesis.stateful import (
 
 from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.macros import Macro
-from multidrop.macros.model import Step
+from multidrop.macros.model import MacroStep
 from multidrop.shell.scripts.executor import play
 from multidrop.simulator.cell.spec import Faults
 from soak.judge import Witness
@@ -127,7 +127,9 @@ class AnyOrder(RuleBasedStateMachine):
     @rule(drive=DRIVES)
     def macro(self, drive):
         lines = (f"@{drive} MR {next(self.numbers)}", "/wait stopped 5", f"@{drive} PR P")
-        self.run(play(self.session, self.session.origin, Macro("m", tuple(Step(0.05, line) for line in lines)), {}))
+        self.run(
+            play(self.session, self.session.origin, Macro("m", tuple(MacroStep(0.05, line) for line in lines)), {})
+        )
 
     @rule(wait=st.floats(0.0, 0.1))
     def stop_amid_a_line(self, wait):

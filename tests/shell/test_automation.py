@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from multidrop.base.errors import DriveError, Refused, Stopped, TransportLost
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import By
 from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.shell.scripts import model
@@ -36,7 +36,7 @@ GO = {
 async def script(session, *lines):
     """As `multidrop run` does it."""
     async with automated(session):
-        body = [model.Step(model.ScriptLine("s", number, line)) for number, line in enumerate(lines, 1)]
+        body = [model.ScriptStep(model.ScriptLine("s", number, line)) for number, line in enumerate(lines, 1)]
         await run_script(session, session.origin, model.Script("s", body, {}))
 
 
@@ -48,7 +48,7 @@ async def sent(session, *lines):
 
 async def macro(session, *lines):
     """As a key does it."""
-    session.macros.save(Macro("m", tuple(Step(0.0, line) for line in lines)))
+    session.macros.save(Macro("m", tuple(MacroStep(0.0, line) for line in lines)))
     await session.run("/play m")
 
 
@@ -184,7 +184,7 @@ async def test_an_automation_that_ends_well_leaves_what_it_moved(shop):
 
 
 async def test_a_macro_within_a_script_belongs_to_it(shop):
-    shop.session.macros.save(Macro("m", (Step(0.0, GO["press:b"]), Step(0.0, "@press:b PR XX"))))
+    shop.session.macros.save(Macro("m", (MacroStep(0.0, GO["press:b"]), MacroStep(0.0, "@press:b PR XX"))))
     with pytest.raises(Refused):
         await script(shop.session, GO["gantry:c"], "/play m")
     assert shop.moving() == set()

@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.dialects import Started
-from multidrop.shell.automation import Automation, Sent, outcome
+from multidrop.shell.automation import Automation, SentMotion, outcome
 from multidrop.shell.origin import PERSON
 from tests.support.automated import automated
 from tests.support.cell_session import CellSession, bus, party
@@ -56,7 +56,7 @@ async def test_a_claim_is_for_its_drive_and_a_global_address_for_all_of_its_line
     assert automation.has(claim(other)) is has
     if own[1] != "*" and other[1] != "*":
         started = Automation(0)
-        started.started[at(shop, *own)] = Sent(0.0, Started())
+        started.started[at(shop, *own)] = SentMotion(0.0, Started())
         assert started.has(claim(other)) is has
     assert not Automation(0).has(claim(other))
 
@@ -181,7 +181,7 @@ async def test_a_line_that_was_refused_started_nothing(shop):
     automations = shop.session.automations
     async with automated(shop.session):
         current, drive = shop.session.origin.automation, at(shop, "press", "a")
-        first = Sent(1.0, Started())
+        first = SentMotion(1.0, Started())
         current.started[drive] = first
         automations.restores(current, drive, None)
         assert current.started == {}
@@ -196,7 +196,7 @@ async def test_a_line_that_was_refused_started_nothing(shop):
 async def test_a_further_start_adds_to_what_was_started_and_makes_it_due_again(shop):
     automations, drive = shop.session.automations, at(shop, "press", "a")
     automation = Automation(0)
-    automation.stopped[drive] = Sent(0.0, Started())
+    automation.stopped[drive] = SentMotion(0.0, Started())
     first = Started(frozenset("x"), program=False, lasts=False)
     automations.records(automation, drive, first)
     automations.records(automation, drive, Started(frozenset("y"), program=True, lasts=False))

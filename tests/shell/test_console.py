@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.console import ALT, CONTROL, MENU, SHIFT, Key, KeyBytes, X, may_swallow, whole_characters
+from multidrop.shell.console import ALT, CONTROL, MENU, SHIFT, KeyBytes, KeyRecord, X, may_swallow, whole_characters
 
 CONTROL_RIGHT, ALT_LEFT = 0x04, 0x02
 
@@ -14,7 +14,7 @@ def typed(*keys):
 
 
 def pressed(code, character="\0", held=0, repeats=1):
-    return Key(True, code, character, held, repeats)
+    return KeyRecord(True, code, character, held, repeats)
 
 
 @pytest.mark.parametrize(
@@ -45,8 +45,8 @@ def pressed(code, character="\0", held=0, repeats=1):
         (pressed(0x11, held=CONTROL_RIGHT), b""),  # Control by itself
         (pressed(0, "\x1b"), b"\x1b"),  # the console's own sequences come as keys without a code
         (pressed(0, "[", ALT_LEFT), b"["),
-        (Key(False, 0x41, "a"), b""),
-        (Key(False, MENU, "\u20ac"), b"\xe2\x82\xac"),  # Alt and 0128
+        (KeyRecord(False, 0x41, "a"), b""),
+        (KeyRecord(False, MENU, "\u20ac"), b"\xe2\x82\xac"),  # Alt and 0128
     ],
 )
 def test_a_key_is_what_a_terminal_sends_for_it(key, sent):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, Step, checked_values
+from multidrop.macros import Macro, MacroStep, checked_values
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.scripts import words
 from tests.support.cases import for_each
@@ -43,7 +43,7 @@ def test_options_that_may_be_repeated_are_all_kept(tmp_path, multidrop) -> None:
     [("0.1", "0.1"), ("1e3", ""), ("9007199254740993.5", ""), ("0.12345678901234567", ""), ("007.50", "7.5")],
 )
 def test_a_number_of_a_macro_has_all_its_digits_or_is_refused(text: str, taken: str) -> None:
-    macro = Macro("go", (Step(0.0, "R1={N:float}"),))
+    macro = Macro("go", (MacroStep(0.0, "R1={N:float}"),))
     if taken:
         assert checked_values(macro, {"N": text}) == {"N": taken}
     else:
@@ -53,7 +53,7 @@ def test_a_number_of_a_macro_has_all_its_digits_or_is_refused(text: str, taken: 
 
 async def test_a_description_is_kept_as_it_was_typed(tmp_path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
-        shop.session.macros.save(Macro("go", (Step(0.0, "@a PR P"),)))
+        shop.session.macros.save(Macro("go", (MacroStep(0.0, "@a PR P"),)))
         for typed, kept in (('turn  the "left" one', 'turn  the "left" one'), ('"to the left"', "to the left")):
             await shop.session.run(f"/macro describe go {typed}")
             assert shop.session.macros.load("go").note == kept

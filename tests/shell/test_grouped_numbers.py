@@ -15,7 +15,7 @@ from multidrop.families.lexium.manual.grammar import LineError, check_groups
 from multidrop.families.pmx.manual import program_file as pmx_file
 from multidrop.families.pmx.manual.table import grouped
 from multidrop.families.tmcl.manual import commands
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import By
 from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.reading import read_script
@@ -137,7 +137,7 @@ async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
                 with pytest.raises(Inexpressible, match="nothing was sent"):
                     await shop.session.run(line, replace(shop.session.origin, by=by))
         with pytest.raises(Diagnostic, match="write 200000"):
-            await play(shop.session, shop.session.origin, Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
+            await play(shop.session, shop.session.origin, Macro("go", (MacroStep(0.0, "@a MA 200,000"),)), {})
         await asyncio.sleep(1.0)
         assert b"200" not in shop.written("press") + shop.written("stages") and not shop.moving()
         await shop.session.run("@a MA 200,1")
@@ -161,7 +161,7 @@ async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anythi
         script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"} if "{" in wrong else {})
         with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent"):
             await run_script(shop.session, shop.session.origin, script)
-        macro = Macro("go", (Step(0.0, "@a MR 51200"), Step(0.0, wrong)))
+        macro = Macro("go", (MacroStep(0.0, "@a MR 51200"), MacroStep(0.0, wrong)))
         with pytest.raises(Diagnostic, match="go, step 2: "):
             await play(shop.session, shop.session.origin, macro, {"FAR": "200,000"} if "{" in wrong else {})
         await asyncio.sleep(1.0)

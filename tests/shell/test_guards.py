@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from multidrop.base.errors import Diagnostic, Stopped
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell import configuration
 from multidrop.shell.events import By
 from multidrop.shell.scripts.executor import play
@@ -88,7 +88,7 @@ async def test_a_script_and_a_macro_ask_nobody(shop):
     with pytest.raises(Diagnostic, match="a script cannot ask, nothing was sent; --yes agrees beforehand"):
         await shop.session.run("@a CP", replace(shop.session.origin, by=By.SCRIPT))
     with pytest.raises(Diagnostic, match="a macro cannot ask"):
-        await play(shop.session, shop.session.origin, Macro("wipe", (Step(0.0, "@a CP"),)), {})
+        await play(shop.session, shop.session.origin, Macro("wipe", (MacroStep(0.0, "@a CP"),)), {})
     assert person.asked == [] and silent(shop)
     shop.session.questions.agreed = True
     await shop.session.run("@a CP", replace(shop.session.origin, by=By.SCRIPT))

@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.events import Bytes
-from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.event_printer import EventPrinter
 from tests.support.cell_session import CellSession, bus
 
 pytestmark = pytest.mark.virtual
@@ -52,7 +52,7 @@ async def test_raw_mode_shows_its_bytes_once(tmp_path: Path) -> None:
 
 
 def test_they_are_no_output_of_a_program_that_reads_replies(capsys: pytest.CaptureFixture[str]) -> None:
-    printer = Printer()
+    printer = EventPrinter()
     printer.show(Bytes(1.0, "line", False, "12:00:00.000", ("30 0D 0A",), watched=True))
     printer.show(Bytes(1.0, "line", False, "12:00:00.000", ("31",)))
     out, error = capsys.readouterr()

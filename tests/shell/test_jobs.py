@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.shell.channel import running
 from multidrop.shell.events import Notified, Printed, Progressed
-from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.event_printer import EventPrinter
 
 
 class Channel:
@@ -100,7 +100,7 @@ def test_a_terminal_has_one_line_that_gives_way_to_others(monkeypatch):
     text = shown(
         monkeypatch,
         Terminal(),
-        Printer(),
+        EventPrinter(),
         Progressed(0, "load", 100, 200),
         Progressed(1, "load", 7, 9),
         Printed(1, "press", "a", "51200"),
@@ -114,13 +114,13 @@ def test_a_terminal_has_one_line_that_gives_way_to_others(monkeypatch):
 
 def test_a_line_is_cut_at_the_width_of_the_terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "20")
-    assert shown(monkeypatch, Terminal(), Printer(), Progressed(0, "x" * 50, 1, 2)) == f"\r{'x' * 19}"
+    assert shown(monkeypatch, Terminal(), EventPrinter(), Progressed(0, "x" * 50, 1, 2)) == f"\r{'x' * 19}"
 
 
 def test_a_pipe_sees_no_progress(monkeypatch):
     events = Progressed(0, "load", 1, 2), Notified(0, "careful", warning=True), Progressed(0, "load", 2, 2)
-    assert shown(monkeypatch, io.StringIO(), Printer(), *events) == "careful\n"
+    assert shown(monkeypatch, io.StringIO(), EventPrinter(), *events) == "careful\n"
 
 
 def test_the_prompt_writes_no_progress_among_its_lines(monkeypatch):
-    assert shown(monkeypatch, Terminal(), Printer(talkative=True), Progressed(0, "load", 1, 2)) == ""
+    assert shown(monkeypatch, Terminal(), EventPrinter(talkative=True), Progressed(0, "load", 1, 2)) == ""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from multidrop.dialects.families import languages
 from multidrop.shell.events import Output, Printed
 from multidrop.shell.operations.table import VERBS
-from multidrop.shell.streams.event_printer import Printer, laid_out
+from multidrop.shell.streams.event_printer import EventPrinter, laid_out
 from tests.support.posix import pty
 
 NOTE = "  note       beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12"
@@ -63,12 +63,12 @@ def test_a_terminal_gets_rows_of_its_width_and_a_pipe_the_line_as_it_is(
         patch.setattr(sys, "stdout", terminal)
         patch.setattr(sys, "__stdout__", terminal)
         patch.delenv("COLUMNS", raising=False)
-        Printer().show(Output(0.0, NOTE, columns=True))
-        Printer().show(Printed(0.0, "press", "a", "x" * 100))
+        EventPrinter().show(Output(0.0, NOTE, columns=True))
+        EventPrinter().show(Printed(0.0, "press", "a", "x" * 100))
         heard = ""
         while not heard.endswith("x\r\n"):
             heard += os.read(reader, 4096).decode()
     assert heard.split("\r\n") == [*laid_out(NOTE, 80), "x" * 100, ""]
     os.close(reader)
-    Printer().show(Output(0.0, NOTE, columns=True))
+    EventPrinter().show(Output(0.0, NOTE, columns=True))
     assert capsys.readouterr().out == f"{NOTE}\n"

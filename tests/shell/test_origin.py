@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.foreign import Guard
+from multidrop.base.foreign import ForeignGuard
 from multidrop.shell.events import Entered, Output, Printed
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.origin import PERSON, Origin
@@ -85,7 +85,7 @@ async def test_a_line_that_a_feature_by_others_runs_without_its_origin_is_refuse
 
     shop.events.clear()
     with pytest.raises(Diagnostic, match=r"a feature ran it without its origin; it was not sent.*call\.run"):
-        await Guard("gauge").function(verb)()
+        await ForeignGuard("gauge").function(verb)()
     assert shop.written("press") == b"" and shop.moving() == set()
-    await Guard("gauge").function(said)()
+    await ForeignGuard("gauge").function(said)()
     assert shop.moving() == {"press:a"}

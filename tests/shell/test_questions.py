@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.shell.configuration import Settings
-from multidrop.shell.prompt.terminal_input import PAUSE, Answer, at_keyboard
+from multidrop.shell.prompt.terminal_input import TYPING_PAUSE, TypedAnswer, at_keyboard
 from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
@@ -101,7 +101,7 @@ async def test_keys_from_before_a_question_and_behind_the_answer_to_another_one_
         for each in early:
             keys.press(each)
         asking = asyncio.create_task(at_keyboard(keys, "FD erases the drive"))
-        await asyncio.sleep(2 * PAUSE)
+        await asyncio.sleep(2 * TYPING_PAUSE)
         assert not asking.done()
         keys.press(key)
         keys.press("y")
@@ -135,7 +135,11 @@ async def test_an_interruption_ends_the_question(made):
 
 def test_only_a_key_after_a_pause_answers():
     for key, meant in {"y": True, "Y": True, "n": False, "\r": False, "\x1b": False, "\x03": False, "x": None}.items():
-        assert Answer(0.0).key(key, PAUSE) is meant
-        assert Answer(0.0).key(key, PAUSE * 0.9) is None
-    answer = Answer(0.0)
-    assert [answer.key(key, PAUSE * at) for key, at in (("y", 0.9), ("y", 1.8), ("y", 2.9))] == [None, None, True]
+        assert TypedAnswer(0.0).key(key, TYPING_PAUSE) is meant
+        assert TypedAnswer(0.0).key(key, TYPING_PAUSE * 0.9) is None
+    answer = TypedAnswer(0.0)
+    assert [answer.key(key, TYPING_PAUSE * at) for key, at in (("y", 0.9), ("y", 1.8), ("y", 2.9))] == [
+        None,
+        None,
+        True,
+    ]

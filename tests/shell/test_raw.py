@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, NoAnswer, Stopped, TransportLost
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Bytes
-from multidrop.shell.raw import Form, hex_of, parse_bytes, text_of
+from multidrop.shell.raw import ByteForm, hex_of, parse_bytes, text_of
 from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
 from tests.support.automated import automated
@@ -164,7 +164,7 @@ async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         for line in ("MR 5", "@a MR 5", "@line:a MR 5"):
             with pytest.raises(Diagnostic, match="line is raw: a macro's lines are for drives; |has no address"):
-                await play(shop.session, shop.session.origin, Macro("go", (Step(0.0, line),)), {})
+                await play(shop.session, shop.session.origin, Macro("go", (MacroStep(0.0, line),)), {})
         assert shop.written("line") == b""
 
 
@@ -329,11 +329,11 @@ def test_bytes_are_written_as_hex_names_and_text():
 
 @given(st.binary(max_size=200))
 def test_rows_hold_every_byte_and_no_control_character(data):
-    for form in Form:
+    for form in ByteForm:
         shown = list(form.rows(data))
         assert all(row.isprintable() and row.isascii() for row in shown)
-    assert bytes.fromhex("".join(Form.HEX.rows(data))) == data
-    assert parse_bytes(hex_of(data)) == data and text_of(data) == "".join(Form.TEXT.rows(data))
+    assert bytes.fromhex("".join(ByteForm.HEX.rows(data))) == data
+    assert parse_bytes(hex_of(data)) == data and text_of(data) == "".join(ByteForm.TEXT.rows(data))
 
 
 @pytest.mark.parametrize("answer", [True, False])

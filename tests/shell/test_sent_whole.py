@@ -21,7 +21,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.families.lexium.host.modbus.codec import Modbus, ModbusState
 from multidrop.families.lexium.manual.grammar import Number, parsed
 from multidrop.families.tmcl.manual import commands
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, parse
 from multidrop.shell.origin import PERSON
@@ -91,14 +91,14 @@ async def test_a_script_and_a_macro_are_refused_before_their_first_line(tmp_path
                 await play(
                     shop.session,
                     PERSON,
-                    Macro("go", (Step(0.0, "@press:a MR 51200"), Step(0.0, wrong))),
+                    Macro("go", (MacroStep(0.0, "@press:a MR 51200"), MacroStep(0.0, wrong))),
                     {},
                 )
         with pytest.raises(Diagnostic, match="go, step 2: .*# begins a comment"):
             await play(
                 shop.session,
                 PERSON,
-                Macro("go", (Step(0.0, "@press:a MR 51200"), Step(0.0, "@press:a MR 5 # x"))),
+                Macro("go", (MacroStep(0.0, "@press:a MR 51200"), MacroStep(0.0, "@press:a MR 5 # x"))),
                 {},
             )
         value = read_script(str(_written(tmp_path, "@press:a MR 51200\n@press:a MR {FAR}\n")), {"FAR": "51\\200"})

@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped, TransportLost
 from multidrop.drives.events import Notice, Sent, Unsolicited
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from multidrop.shell.scripts.executor import play
@@ -112,7 +112,7 @@ async def test_an_address_at_the_head_of_a_command_is_refused_with_the_right_spe
         await both.run(line)
     assert both.written("press") == both.written("eth") == b""
     with pytest.raises(Diagnostic, match=re.escape(f"write {right}")):
-        await play(both.session, both.session.origin, Macro("m", (Step(0.0, line),)), {})
+        await play(both.session, both.session.origin, Macro("m", (MacroStep(0.0, line),)), {})
     assert both.written("press") == both.written("eth") == b""
 
 
@@ -420,7 +420,7 @@ async def test_recording_is_seen_and_ends_well(press):
 
 
 def save(cell, *lines):
-    cell.session.macros.save(Macro("m", tuple(Step(0.0, line) for line in lines)))
+    cell.session.macros.save(Macro("m", tuple(MacroStep(0.0, line) for line in lines)))
 
 
 async def test_a_stop_ends_a_playing_macro_and_refuses_the_next(press):
@@ -453,7 +453,7 @@ async def test_a_failing_line_ends_the_macro_and_is_told_once(press):
 
 
 async def test_a_macro_that_plays_itself_is_refused(press):
-    press.session.macros.save(Macro("n", (Step(0.0, "/play m"),)))
+    press.session.macros.save(Macro("n", (MacroStep(0.0, "/play m"),)))
     save(press, "/play n")
     with pytest.raises(Diagnostic, match=r"macro n, step 1 .*: m would call itself: m -> n -> m; use /repeat"):
         await press.run("/play m")

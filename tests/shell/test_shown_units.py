@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.base.errors import DriveError
-from multidrop.families.tmcl.manual.commands import Axis, Call, Command
+from multidrop.families.tmcl.manual.commands import AxisParameter, Command, TmclCall
 from multidrop.shell import setting_units, snapshots
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.waits import standings
@@ -228,7 +228,7 @@ async def test_settings_of_a_second_motor_contradict_its_scale(tmp_path: Path, m
         module, units = shop.session.drive("feeds", "1"), shop.session.units
         await shop.session.run("/params backup one.toml")
         assert units.given(module, "0", 51200) and units.given(module, "1", 51200) == (5.0, "mm")
-        shop.device("feeds:1").carry_out(Call(Command.SAP, Axis.MICROSTEPS, 1, 4), shop.floor.now())
+        shop.device("feeds:1").carry_out(TmclCall(Command.SAP, AxisParameter.MICROSTEPS, 1, 4), shop.floor.now())
         await shop.session.run("/params backup two.toml")
         assert units.given(module, "1", 51200) is None
 

@@ -367,9 +367,9 @@ async def test_where_the_stop_key_may_be_swallowed_nothing_moves_before_it_came_
 @pytest.mark.parametrize("fate", [Fate.STANDING, Fate.STARTED, Fate.NOT_KNOWN])
 def test_the_banner_is_the_longest_wording_that_fits_and_at_worst_the_shortest(fate):
     fates = (fate,) if fate is Fate.STANDING else (fate, Fate.STANDING)
-    tally = stop_report.Tally(
+    tally = stop_report.FateTally(
         datetime(2026, 1, 2, 3, 4, 5),
-        tuple(stop_report.Found(each, f"drive {at}", "press") for at, each in enumerate(fates)),
+        tuple(stop_report.DriveFate(each, f"drive {at}", "press") for at, each in enumerate(fates)),
     )
     whole = stop_report.headline(tally)
     wordings = {stop_report.headline(tally, width) for width in range(1, len(whole) + 1)}

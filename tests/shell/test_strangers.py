@@ -12,7 +12,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.drives.stopping import Fate
-from multidrop.drives.telemetry import Value
+from multidrop.drives.telemetry import DriveValue
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By, Notified
@@ -90,7 +90,7 @@ async def test_nothing_is_polled_but_what_a_person_named(session: Session, plc: 
     await session.run("MA 100")
     await asyncio.sleep(QUIET)
     assert plc.received == [MA]
-    polls.append(telemetry.read([Value("", "P")], 0.01))
+    polls.append(telemetry.read([DriveValue("", "P")], 0.01))
     await until(lambda: plc.received.count(P) > 3)
     for each in polls:
         each.close()

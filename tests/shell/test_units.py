@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from multidrop.base.errors import Diagnostic, Differs, DriveError, Inexpressible, Refused, Stopped
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import By, Notified
 from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import play, run_script
@@ -490,7 +490,9 @@ async def test_a_recorded_macro_has_the_quantity_as_typed_and_plays_it(tmp_path)
         assert [step.line for step in macro.steps] == ["@a MR {1 mm}", "/wait stopped"]
         shop.session.recorder.discard()
         await play(shop.session, shop.session.origin, macro, {}, fast=True)
-        await play(shop.session, shop.session.origin, Macro("n", (Step(0.0, "@a MR {X}"),)), {"X": "2 mm"}, fast=True)
+        await play(
+            shop.session, shop.session.origin, Macro("n", (MacroStep(0.0, "@a MR {X}"),)), {"X": "2 mm"}, fast=True
+        )
         assert moves(shop) == ["MR 10240", "MR 10240", "MR 20480"]
 
 

@@ -12,7 +12,7 @@ import pytest
 from multidrop.base.errors import Diagnostic, DriveError, Timeout
 from multidrop.dialects import Motion
 from multidrop.shell.origin import PERSON
-from multidrop.shell.waits import SIGNS, Condition, Standing, condition, in_motion, seconds, standings, wait
+from multidrop.shell.waits import SIGNS, Standing, WaitCondition, condition, in_motion, seconds, standings, wait
 from tests.support.cell_session import CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -30,26 +30,26 @@ async def shop(tmp_path: Path) -> AsyncIterator[Any]:
 # Conditions
 
 CONDITIONS = {
-    "I1=1": Condition("", "I1", "=", 1),
-    "P==0": Condition("", "P", "==", 0),
-    "P!=-3": Condition("", "P", "!=", -3),
-    "P<+7": Condition("", "P", "<", 7),
-    " P <= 7 ": Condition("", "P", "<=", 7),
-    "@b P>51200": Condition("b", "P", ">", 51200),
-    "@press:b  P >= {100 mm}": Condition("press:b", "P", ">=", 0, "{100 mm}"),
-    "P=999999999999999": Condition("", "P", "=", 999999999999999),
+    "I1=1": WaitCondition("", "I1", "=", 1),
+    "P==0": WaitCondition("", "P", "==", 0),
+    "P!=-3": WaitCondition("", "P", "!=", -3),
+    "P<+7": WaitCondition("", "P", "<", 7),
+    " P <= 7 ": WaitCondition("", "P", "<=", 7),
+    "@b P>51200": WaitCondition("b", "P", ">", 51200),
+    "@press:b  P >= {100 mm}": WaitCondition("press:b", "P", ">=", 0, "{100 mm}"),
+    "P=999999999999999": WaitCondition("", "P", "=", 999999999999999),
     "P=1000000000000000": None,
     "P={}": None,
     "P={{1 mm}}": None,
     "_P=1": None,
-    "P_1=1": Condition("", "P_1", "=", 1),
+    "P_1=1": WaitCondition("", "P_1", "=", 1),
     "1P=1": None,
     "P=\u0661": None,
 }
 
 
 @pytest.mark.parametrize(("text", "found"), CONDITIONS.items())
-def test_a_condition_is_read_whole(text: str, found: Condition | None) -> None:
+def test_a_condition_is_read_whole(text: str, found: WaitCondition | None) -> None:
     assert condition(text) == found
 
 
@@ -66,7 +66,7 @@ def test_a_condition_is_read_whole(text: str, found: Condition | None) -> None:
     ],
 )
 def test_each_sign_holds_below_at_and_above_its_value(sign: str, below: bool, equal: bool, above: bool) -> None:
-    wanted = Condition("", "P", sign, 5)
+    wanted = WaitCondition("", "P", sign, 5)
     assert [wanted.holds(seen) for seen in (4, 5, 6)] == [below, equal, above]
 
 
@@ -75,8 +75,8 @@ def test_every_sign_has_a_meaning() -> None:
 
 
 def test_a_condition_is_shown_with_its_number_or_its_quantity() -> None:
-    assert Condition("b", "P", ">=", 5).text == "P>=5"
-    assert Condition("b", "P", ">=", 512.5, "{1 mm}").text == "P>={1 mm}"
+    assert WaitCondition("b", "P", ">=", 5).text == "P>=5"
+    assert WaitCondition("b", "P", ">=", 512.5, "{1 mm}").text == "P>={1 mm}"
 
 
 @pytest.mark.parametrize(

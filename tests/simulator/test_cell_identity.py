@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.simulator import cells
 from multidrop.simulator import cells as cell
-from multidrop.simulator.cell.writer import BusText, DriveText, Entry, plain, write
+from multidrop.simulator.cell.writer import BusText, CellEntry, DriveText, plain, write
 from multidrop.simulator.floor import Floor
 from tests.support.cases import for_each
 
@@ -177,7 +177,7 @@ texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\r\
 
 @given(st.lists(texts, min_size=1), texts)
 def test_any_program_and_any_identity_are_read_as_they_were_written(lines, part):
-    drive = DriveText("LMDCM", "a", program=lines, identity=[Entry("part", plain(part)), Entry("position", -5)])
+    drive = DriveText("LMDCM", "a", program=lines, identity=[CellEntry("part", plain(part)), CellEntry("position", -5)])
     (bus,) = cells.read(write([BusText("b", [drive], missing=["c does not reply"])])).buses
     (spec,) = bus.drives
     assert spec.program.removesuffix("\n").split("\n") == lines

@@ -13,7 +13,7 @@ from multidrop.families.lexium.simulator.state.models import MODELS
 from multidrop.simulator.cell.drive_keys import WORLD_KEYS, common_keys, read_worlds
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table
-from multidrop.simulator.cells import Reader
+from multidrop.simulator.cells import CellReader
 from multidrop.simulator.declared import simulated
 from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, family_of
 from multidrop.simulator.family import Place, SimulatedFamily, Unit
@@ -128,12 +128,12 @@ def run(wire: Wire, until: float = 10.0) -> bytes:
 
 
 def test_a_cell_reads_drives_of_the_families_that_it_is_given() -> None:
-    cell = Reader({**BY_PERSONALITY, "TOYM": Toy}).read(CELL)
+    cell = CellReader({**BY_PERSONALITY, "TOYM": Toy}).read(CELL)
     first, second = cell.buses[0].drives
     assert (first.personality, first.name, second.name) == ("TOYM", "13", "27")
     assert first.further == (WorldSpec(), WorldSpec(home=(-5, 5)))
     with pytest.raises(Diagnostic, match='personality cannot be "TOYM"'):
-        Reader(BY_PERSONALITY).read(CELL)
+        CellReader(BY_PERSONALITY).read(CELL)
 
 
 @pytest.mark.parametrize("baud", [0, 9600])

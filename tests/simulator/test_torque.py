@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import MotorSpec, WorldSpec
-from multidrop.simulator.kinematics import LINEAR, SINUSOIDAL, TRIANGLE, Pace, Profile, Shape, move, slew
+from multidrop.simulator.kinematics import LINEAR, SINUSOIDAL, TRIANGLE, MotionPace, Profile, Shape, move, slew
 from multidrop.simulator.torque import MOTORS, Torque
 from tests.support.cases import for_each
 from tests.support.examples import examples
@@ -36,7 +36,7 @@ def test_a_motor_gives_what_its_rows_say_and_straight_lines_between_them() -> No
 def test_acceleration_of_an_inertia_takes_two_pi_times_both() -> None:
     """0.01 kg m2 at 10 rev/s2 take 0.628 N m; at a current of 62 % there is less than that."""
     torque = Torque(WorldSpec(motor=FLAT, inertia=0.01))
-    profile = move(0.0, 0.0, 0.0, 50_000.0, Pace(vi=0.0, vm=5000.0, a=10_000.0, d=10_000.0))
+    profile = move(0.0, 0.0, 0.0, 50_000.0, MotionPace(vi=0.0, vm=5000.0, a=10_000.0, d=10_000.0))
     assert torque.fails_at(profile, 0.0, 0.63, TURN) == inf
     assert torque.fails_at(profile, 0.0, 0.62, TURN) == 0.0
     assert torque.used(profile, 0.1, 0.63, TURN) == pytest.approx(0.2 * pi / 0.63)
@@ -45,7 +45,7 @@ def test_acceleration_of_an_inertia_takes_two_pi_times_both() -> None:
 
 def test_a_load_helps_to_brake_and_an_inertia_can_take_too_much_then() -> None:
     torque = Torque(WorldSpec(motor=FLAT, inertia=0.01, load=0.3))
-    profile = move(0.0, 0.0, 0.0, 50_000.0, Pace(vi=0.0, vm=5000.0, a=1_000.0, d=20_000.0))
+    profile = move(0.0, 0.0, 0.0, 50_000.0, MotionPace(vi=0.0, vm=5000.0, a=1_000.0, d=20_000.0))
     braking = profile.segments[-1].start
     assert torque.fails_at(profile, 0.0, 0.5, TURN) == pytest.approx(braking), "1.257 - 0.3 N m"
     assert torque.fails_at(profile, 0.0, 0.96, TURN) == inf
@@ -54,7 +54,7 @@ def test_a_load_helps_to_brake_and_an_inertia_can_take_too_much_then() -> None:
 def test_friction_that_grows_with_the_speed_is_met_in_the_middle_of_a_ramp() -> None:
     """0.1 N m for each rev/s: 0.5 N m are there up to 5 rev/s, after 0.5 s."""
     torque = Torque(WorldSpec(motor=FLAT, friction=0.1))
-    profile = slew(0.0, 0.0, 0.0, 8000.0, Pace(vi=0.0, vm=inf, a=10_000.0, d=10_000.0))
+    profile = slew(0.0, 0.0, 0.0, 8000.0, MotionPace(vi=0.0, vm=inf, a=10_000.0, d=10_000.0))
     assert torque.fails_at(profile, 0.0, 0.5, TURN) == pytest.approx(0.5)
     assert torque.fails_at(profile, 0.0, 0.81, TURN) == inf
 
@@ -81,7 +81,7 @@ def test_the_time_of_a_stall_is_found_where_looking_often_finds_one(
     load, friction, inertia = world
     torque = Torque(WorldSpec(motor=NEMA17, load=load, friction=friction, inertia=inertia))
     shape = Shape(kind)
-    profile = move(0.0, 0.0, 0.0, 40_000.0, Pace(vi=100.0, vm=top, a=rates[0], d=rates[1], up=shape, down=shape))
+    profile = move(0.0, 0.0, 0.0, 40_000.0, MotionPace(vi=100.0, vm=top, a=rates[0], d=rates[1], up=shape, down=shape))
     found, more, less = (torque.fails_at(profile, 0.0, share * part, TURN) for part in (1, 1.02, 0.98))
     assert less <= found <= more
     seen = brute_force(torque, profile, share)

@@ -8,26 +8,26 @@ from multidrop.base.errors import Diagnostic
 from multidrop.families.lexium.manual import program_file
 from multidrop.families.lexium.simulator.program_run import MCodeRun
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.program_events import Event, Summary
-from multidrop.simulator.program_run import LONGEST
+from multidrop.simulator.program_events import ProgramEvent, Summary
+from multidrop.simulator.program_run import LONGEST_RUN
 
 
-def tried(text: str, label: str = "", until: float | None = None, **spec: object) -> list[Event]:
+def tried(text: str, label: str = "", until: float | None = None, **spec: object) -> list[ProgramEvent]:
     lines = program_file.read(text, "a.mxt")
     return list(MCodeRun(DriveSpec(**spec), lines, "a.mxt").run(label, until))  # type: ignore[arg-type]
 
 
-def end(events: list[Event]) -> Summary:
+def end(events: list[ProgramEvent]) -> Summary:
     summary = events[-1]
     assert isinstance(summary, Summary)
     return summary
 
 
-def prints(events: list[Event]) -> list[str]:
+def prints(events: list[ProgramEvent]) -> list[str]:
     return [each.facts["print"] for each in events if "print" in each.facts]
 
 
-def failures(events: list[Event]) -> list[tuple[int, int, bool]]:
+def failures(events: list[ProgramEvent]) -> list[tuple[int, int, bool]]:
     found = [each.facts for each in events if "error" in each.facts]
     return [(each["error"], each["line"], each.get("handled", False)) for each in found]
 
@@ -144,7 +144,7 @@ def test_until_ends_a_program_that_goes_on_and_says_where_it_stood() -> None:
 
 def test_a_program_that_never_ends_is_given_up_without_an_until() -> None:
     summary = end(tried("PG 1\nLB K1\nH 60000\nBR K1\nPG\n"))
-    assert (summary.ended, summary.t, summary.given_up) == ("until", LONGEST, True)
+    assert (summary.ended, summary.t, summary.given_up) == ("until", LONGEST_RUN, True)
 
 
 def test_where_nothing_can_ever_happen_any_more_time_does_not_pass_for_nothing() -> None:

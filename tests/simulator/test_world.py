@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import Pace, move, slew
+from multidrop.simulator.kinematics import MotionPace, move, slew
 from multidrop.simulator.world import World
 
 SCHEDULE = WorldSpec(inputs=((2.0, 1, 0), (2.5, 1, 1), (1.0, 3, 1)), analog=((0.5, 2048), (3.0, 100)))
@@ -106,7 +106,7 @@ def test_pushes_add_up() -> None:
 
 def test_every_switch_on_the_way_is_met_once() -> None:
     world = World(WorldSpec(home=0, limit_plus=2000, limit_minus=-1000))
-    profile = move(5, -3000, 0, 3000, Pace(vi=100, vm=5000, a=1e4, d=1e4))
+    profile = move(5, -3000, 0, 3000, MotionPace(vi=100, vm=5000, a=1e4, d=1e4))
     seen, t = [], 0.0
     while (at := world.next_switch(profile, t)) < inf:
         assert at > t
@@ -121,7 +121,7 @@ def test_every_switch_on_the_way_is_met_once() -> None:
 
 def test_a_switch_is_met_on_the_way_out_and_on_the_way_back() -> None:
     world = World(WorldSpec(limit_plus=1000))
-    profile = move(0, 0, 50_000, 0, Pace(vi=1000, vm=60_000, a=1e6, d=1e6))
+    profile = move(0, 0, 50_000, 0, MotionPace(vi=1000, vm=60_000, a=1e6, d=1e6))
     first = world.next_switch(profile, 0)
     assert world.switches(profile.position(first))[1]
     second = world.next_switch(profile, first)
@@ -131,7 +131,7 @@ def test_a_switch_is_met_on_the_way_out_and_on_the_way_back() -> None:
 
 def test_a_push_moves_the_switches_against_the_motor() -> None:
     world = World(WorldSpec(home=0))
-    profile = slew(0, 500, 0, -100, Pace(vi=100, vm=inf, a=1, d=1))
+    profile = slew(0, 500, 0, -100, MotionPace(vi=100, vm=inf, a=1, d=1))
     assert world.next_switch(profile, 0) == pytest.approx(5)
     assert world.next_switch(profile, 0, offset=-200) == pytest.approx(3)
 
@@ -139,7 +139,7 @@ def test_a_push_moves_the_switches_against_the_motor() -> None:
 @given(st.integers(-(10**6), 10**6), st.sampled_from((-1.0, 1.0)), st.floats(0, 1e5), st.integers(1, 10**6))
 def test_the_time_of_a_switch_is_one_at_which_it_has_changed(mark: int, way: float, at: float, speed: int) -> None:
     world = World(WorldSpec(home=mark))
-    profile = slew(at, mark - way * 1000, 0, way * speed, Pace(vi=1, vm=inf, a=1e9, d=1e9))
+    profile = slew(at, mark - way * 1000, 0, way * speed, MotionPace(vi=1, vm=inf, a=1e9, d=1e9))
     before = world.switches(profile.origin)[0]
     found = world.next_switch(profile, at)
     assert found < inf

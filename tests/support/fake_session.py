@@ -26,7 +26,7 @@ from multidrop.dialects.units import scale as scale_of
 from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
-from multidrop.drives.telemetry import Value
+from multidrop.drives.telemetry import DriveValue
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
@@ -35,8 +35,8 @@ from multidrop.shell.origin import PERSON, Origin
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.state.backups import Drafts
-from multidrop.shell.stop_report import Found, Tally
-from multidrop.shell.units import Axis, Units
+from multidrop.shell.stop_report import DriveFate, FateTally
+from multidrop.shell.units import ScaledAxis, SessionUnits
 from multidrop.transports import Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
@@ -97,7 +97,7 @@ class FakeTelemetry:
         self.held.append(subscription)
         return subscription
 
-    def read(self, values: Sequence[Value], period: float = 0.0) -> FakeSubscription:
+    def read(self, values: Sequence[DriveValue], period: float = 0.0) -> FakeSubscription:
         subscription = FakeSubscription(self, tuple(f"{each.address}.{each.word}" for each in values), period)
         self.held.append(subscription)
         return subscription
@@ -150,19 +150,19 @@ class FakeMacros:
         return Path("/nowhere") / f"{name}.toml"
 
 
-class FakeUnits(Units):
+class FakeUnits(SessionUnits):
     """The scales of drives, by address and axis, with what they rest on: 51200 steps a turn."""
 
     def __init__(self) -> None:
         self.shown = True
-        self.given_axes: dict[tuple[str, str], Axis] = {}
+        self.given_axes: dict[tuple[str, str], ScaledAxis] = {}
 
-    def give(self, address: str, scale: str | dict[str, Any], axis: str = "", turn: int = 51200) -> Axis:
-        found = self.given_axes[address, axis] = Axis(scale_of(scale))
+    def give(self, address: str, scale: str | dict[str, Any], axis: str = "", turn: int = 51200) -> ScaledAxis:
+        found = self.given_axes[address, axis] = ScaledAxis(scale_of(scale))
         found.accept(Basis((("MS", "256"),), Fraction(turn)))
         return found
 
-    def of(self, drive: Any, axis: str = "") -> Axis | None:
+    def of(self, drive: Any, axis: str = "") -> ScaledAxis | None:
         return self.given_axes.get((drive.address, axis))
 
     def referenced(self, drive: Any, axis: str) -> bool:
@@ -318,13 +318,15 @@ class FakeSession:
         self.interrupts += 1
         self.busy = False
 
-    def tally(self) -> Tally:
+    def tally(self) -> FateTally:
         found = [
-            Found(self.fates.get(f"{bus.name}:{each}", Fate.SENT), f"{bus.name}:{each}".rstrip(":"), bus.name, "lost")
+            DriveFate(
+                self.fates.get(f"{bus.name}:{each}", Fate.SENT), f"{bus.name}:{each}".rstrip(":"), bus.name, "lost"
+            )
             for bus in self.buses.values()
             for each in bus.drives
         ]
-        return Tally(self.wall(self.time), tuple(found))
+        return FateTally(self.wall(self.time), tuple(found))
 
     async def in_motion(self) -> list[str]:
         return self.moves

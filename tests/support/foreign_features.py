@@ -23,7 +23,7 @@ from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.foreign import guarded
-from multidrop.base.registry import Entry
+from multidrop.base.registry import FeatureEntry
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.usb import UsbModule
 from multidrop.shell import configuration, plot_targets, relaying
@@ -215,7 +215,7 @@ def add(monkeypatch: pytest.MonkeyPatch, *adds: object) -> Feature:
     """Let these records be all that any feature adds: those of `x`, which is by others."""
     feature = guarded(Feature("x", "tries to be in the way", adds=adds))
     monkeypatch.setattr(registry, "IN_WHEEL", {})
-    monkeypatch.setattr(registry, "_others", {"p": (Entry("x", "dist", "1", "p"), feature)})
+    monkeypatch.setattr(registry, "_others", {"p": (FeatureEntry("x", "dist", "1", "p"), feature)})
     return feature
 
 

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from multidrop.features.publishing.broker import Message
+from multidrop.features.publishing.broker import BrokerMessage
 from multidrop.transports import Unreachable
 
 
@@ -15,7 +15,7 @@ class KeptBroker:
     """Connections to it are made by `connection`. `refusals`: reasons of the next attempts, one each."""
 
     def __init__(self, window: int = 1000) -> None:
-        self.received: list[Message] = []
+        self.received: list[BrokerMessage] = []
         self.connections: list[KeptConnection] = []
         self.refusals: list[str] = []
         self.attempts: list[float] = []
@@ -49,7 +49,7 @@ class KeptConnection:
 
     def __init__(self, broker: KeptBroker) -> None:
         self._broker = broker
-        self._sent: list[Message] = []
+        self._sent: list[BrokerMessage] = []
         self.lost = asyncio.Event()
         self.on_room: Callable[[], None] = lambda: None
         self.closed = False
@@ -62,7 +62,7 @@ class KeptConnection:
             raise Unreachable(self._broker.refusals.pop(0))
         self._broker.connections.append(self)
 
-    def publish(self, message: Message) -> bool:
+    def publish(self, message: BrokerMessage) -> bool:
         """Take a message, while there is room."""
         if self.lost.is_set() or len(self._sent) >= self._broker.window:
             return False
@@ -76,7 +76,7 @@ class KeptConnection:
         self._broker.received += self._sent
         self._sent.clear()
 
-    def in_flight(self) -> list[Message]:
+    def in_flight(self) -> list[BrokerMessage]:
         """What is not acknowledged."""
         return list(self._sent)
 

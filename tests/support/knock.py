@@ -16,12 +16,12 @@ from multidrop.dialects.state import DriveState, who
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.declared import Simulated
 from multidrop.simulator.family import Place, SimulatedFamily, Unit
-from multidrop.simulator.kinematics import Pace, Profile, halt, move
+from multidrop.simulator.kinematics import MotionPace, Profile, halt, move
 from multidrop.simulator.wire import Port, Transmission
 from multidrop.simulator.world import World
 
 STOP = b"\r*HALT\r"
-PACE = Pace(100.0, 2000.0, 2000.0, 2000.0)
+PACE = MotionPace(100.0, 2000.0, 2000.0, 2000.0)
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ from typing import Any
 import pytest
 
 from multidrop.cli import parse, run
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 
 AT = datetime(2026, 11, 22, 12, 41, 6, 20115, tzinfo=UTC)
 Done = tuple[int, list[str], list[str]]
 """How a command ended; the lines that it printed, and those on standard error."""
 
 
-def entry(kind: str, text: str, bus: str = "press", drive: str = "b", after: float = 0.0, **more: Any) -> Entry:
+def entry(kind: str, text: str, bus: str = "press", drive: str = "b", after: float = 0.0, **more: Any) -> LogEntry:
     """Return an entry of a time, `after` in s."""
-    return Entry(AT + timedelta(seconds=after), kind, text, bus, drive, **more)
+    return LogEntry(AT + timedelta(seconds=after), kind, text, bus, drive, **more)
 
 
 BEGIN = entry("log", "session of process 7", "", "", marks=True)
@@ -71,6 +71,6 @@ def log_command(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
     return call
 
 
-def put(path: Path, *entries: Entry) -> None:
+def put(path: Path, *entries: LogEntry) -> None:
     """Write a log of these entries."""
     path.write_bytes(b"".join(map(line_of, entries)))

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered
 from multidrop.shell.origin import PERSON
 from multidrop.shell.scripts.executor import play
-from multidrop.shell.scripts.model import Ending, Result
+from multidrop.shell.scripts.model import LineResult, MacroEnding
 from multidrop.shell.session import Session
 from tests.support.cell_session import CellSession, bus, party
 
@@ -26,21 +26,21 @@ class Shop(CellSession):
 
     def __init__(self, folder: Path, reconnect: bool = False) -> None:
         super().__init__(folder, *FLOOR, reconnect=reconnect)
-        self.results: list[Result] = []
-        self.endings: list[Ending] = []
+        self.results: list[LineResult] = []
+        self.endings: list[MacroEnding] = []
 
     def save(self, name: str, *lines: str, after: float = 0.0, **more: object) -> Macro:
-        macro = Macro(name, tuple(Step(after, line) for line in lines), **more)  # type: ignore[arg-type]
+        macro = Macro(name, tuple(MacroStep(after, line) for line in lines), **more)  # type: ignore[arg-type]
         self.session.macros.save(macro)
         return macro
 
     async def play(self, macro: Macro, values: dict[str, str] | None = None, **manner: object) -> None:
         await play(self.session, PERSON, macro, values or {}, executed=self.executed, ended=self.ended, **manner)  # type: ignore[arg-type]
 
-    def executed(self, result: Result) -> None:
+    def executed(self, result: LineResult) -> None:
         self.results.append(result)
 
-    def ended(self, ending: Ending) -> None:
+    def ended(self, ending: MacroEnding) -> None:
         self.endings.append(ending)
 
     def begun(self) -> list[tuple[float, str]]:

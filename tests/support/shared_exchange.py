@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.features.sharing.stop_bytes import stop_bytes
-from multidrop.features.sharing.writer_turns import Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
+from multidrop.features.sharing.writer_turns import Action, ClientWrite, Close, PortClients, Purge, Say, Send, Set, Stop
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION
 
@@ -18,7 +18,7 @@ class Port:
     """An exchange whose port takes all bytes at once, unless it is `slow`: then they wait until they are dropped."""
 
     def __init__(self, family: str = "", slow: bool = False, party: bool | None = None) -> None:
-        self.exchange = Exchange(stop_bytes(family, (), party), 9600)
+        self.exchange = PortClients(stop_bytes(family, (), party), 9600)
         self.slow = slow
         self.settles = True
         """Time passes until what follows a line that was made harmless is written."""
@@ -49,7 +49,7 @@ class Port:
     def do(self, actions: list[Action]) -> None:
         for each in actions:
             match each:
-                case Write(_, data):
+                case ClientWrite(_, data):
                     self._take(data)
                 case Stop(data, mended):
                     self.written += mended if self._drop() else data

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import pytest
 
 from multidrop.transports import ssh_session
-from multidrop.transports.relay import GREETING, Frames, Kind, frame
+from multidrop.transports.relay import GREETING, FrameSplitter, Kind, frame
 from tests.support.until import PATIENCE
 
 RELAY = f"{GREETING}\n".encode()
@@ -170,7 +170,7 @@ class FarRelay:
     def __init__(self, machine: Machine, takes: float = 0.0) -> None:
         """`takes`: the time to it and back, s."""
         self.sent = bytearray()
-        self._machine, self._takes, self._frames = machine, takes, Frames()
+        self._machine, self._takes, self._frames = machine, takes, FrameSplitter()
 
     def reply(self, data: bytes) -> bytes:
         said = b""

@@ -39,7 +39,7 @@ class Module:
         """What the port has sent up to now."""
         return b"".join(each.data for each in self.port.sent(self.now))
 
-    def reply(self, text: str, address: int = 1) -> codec.Frame:
+    def reply(self, text: str, address: int = 1) -> codec.ReplyFrame:
         """The reply to a command in TMCL's notation."""
         frame = self.send(codec.frame_of(address, commands.parse(text)))
         assert len(frame) == codec.LENGTH, frame

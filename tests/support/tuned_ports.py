@@ -8,7 +8,7 @@ from typing import Any
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.opening import OpenedBus
 from multidrop.shell.events import Notified, Output, Progressed
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
@@ -69,14 +69,14 @@ class Port:
         self.repeats = repeats
         self.pipes: list[TunedPipe] = []
 
-    async def opener(self, connection: Any, naming: Any) -> list[Opened]:
+    async def opener(self, connection: Any, naming: Any) -> list[OpenedBus]:
         family = connection.hints.family or "mcode"
         baud = connection.baud or FAMILIES[family].baud
         self.opened.append((family, baud))
         pipe: Any = TunedPipe(self.floor, next(iter(self.floor.floor.wires)), baud, self.repeats)
         self.pipes.append(pipe)
         made = Bus(naming(connection.short), pipe, baud=baud, local_echo=connection.local_echo, family=family)
-        return [Opened(made, connection.hints)]
+        return [OpenedBus(made, connection.hints)]
 
     @property
     def devices(self) -> list[Any]:

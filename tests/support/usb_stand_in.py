@@ -17,9 +17,9 @@ from unittest import mock
 
 from multidrop.families.pmx.simulator.device import PmxDevice
 from multidrop.features.usb import libusb
-from multidrop.features.usb.controllers import Found, chosen
+from multidrop.features.usb.controllers import FoundController, chosen
 from multidrop.features.usb.device import UsbController, sides
-from multidrop.features.usb.interface import CANCELLED, GONE, PACKET, STALLED, Control
+from multidrop.features.usb.interface import CANCELLED, GONE, PACKET, STALLED, UsbControl
 from multidrop.features.usb.pipe import Broken, Done, TransferFailed
 from multidrop.features.usb.usbip import setup
 from multidrop.simulator.serving.running import Listener, RunningFloor
@@ -91,11 +91,11 @@ class Plugged(Listener):
         return self.controller.present and not self.floor.floor.wires[self.bus].hung_up
 
     @property
-    def found(self) -> Found:
+    def found(self) -> FoundController:
         """The entry of the list of controllers."""
         device = self.controller.device
         assert isinstance(device, PmxDevice)  # only these have a USB side
-        return Found(f"2ED{device.controller.settings.number}", self.place, "", self)
+        return FoundController(f"2ED{device.controller.settings.number}", self.place, "", self)
 
 
 class Sockets:
@@ -150,7 +150,7 @@ class StandIn:
 
     # Transfers
 
-    def control(self, value: Control) -> int:
+    def control(self, value: UsbControl) -> int:
         def carry_out() -> None:
             status, _ = self._plugged.controller.request(setup(value))
             self._end(number, status)

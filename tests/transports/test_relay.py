@@ -22,12 +22,12 @@ from multidrop.transports.relay import (
     CREDIT,
     GREETING,
     MISSED,
-    MOST,
-    Frames,
-    Garbled,
+    MOST_FRAME_BYTES,
+    FrameSplitter,
+    GarbledFrame,
     Kind,
+    PortSetting,
     Relay,
-    Setting,
     frame,
 )
 from multidrop.transports.relay_pipe import RelayEndpoint, RelayPipe, SocketStream
@@ -48,20 +48,20 @@ def both():
 @given(FRAMES, st.integers(1, 7))
 def test_frames_come_out_as_they_went_in_whole_and_in_pieces(made: list[tuple[Kind, bytes]], size: int) -> None:
     data = b"".join(frame(*each) for each in made)
-    assert list(Frames().take(data)) == made
-    pieces = Frames()
+    assert list(FrameSplitter().take(data)) == made
+    pieces = FrameSplitter()
     found = [each for at in range(0, len(data), size) for each in pieces.take(data[at : at + size])]
     assert found == made
 
 
 @given(st.binary(min_size=3, max_size=30))
 def test_what_is_no_frame_is_refused_and_never_waited_for(data: bytes) -> None:
-    known = data[0] in set(Kind) and int.from_bytes(data[1:3]) <= MOST
+    known = data[0] in set(Kind) and int.from_bytes(data[1:3]) <= MOST_FRAME_BYTES
     if known:
-        list(Frames().take(data[:3]))
+        list(FrameSplitter().take(data[:3]))
     else:
-        with pytest.raises(Garbled):
-            list(Frames().take(data))
+        with pytest.raises(GarbledFrame):
+            list(FrameSplitter().take(data))
 
 
 @dataclass
@@ -323,11 +323,11 @@ def test_an_end_without_a_word_of_the_relay_quotes_ssh() -> None:
 @pytest.mark.parametrize(
     ("setting", "value", "done", "outcome"),
     [
-        (Setting.BAUD, 115200, [("baud", 115200)], ""),
-        (Setting.BREAK, 1, [("break", True)], ""),
-        (Setting.RTS, 0, [("rts", False)], ""),
-        (Setting.DTR, 1, [("dtr", True)], ""),
-        (Setting.BAUD, 7, [], "Invalid argument"),
+        (PortSetting.BAUD, 115200, [("baud", 115200)], ""),
+        (PortSetting.BREAK, 1, [("break", True)], ""),
+        (PortSetting.RTS, 0, [("rts", False)], ""),
+        (PortSetting.DTR, 1, [("dtr", True)], ""),
+        (PortSetting.BAUD, 7, [], "Invalid argument"),
         (99, 7, [], "no setting 99"),
     ],
 )
@@ -353,7 +353,7 @@ def test_a_sign_of_life_is_replied_to_and_no_outcome_is_waited_for_at_the_end(bo
 
 @pytest.mark.parametrize("data", [b"GET / HTTP/1.1\r\n", frame(Kind.LOST), frame(Kind.SET, b"\x01")])
 def test_input_that_is_not_of_multidrop_ends_the_relay(data: bytes) -> None:
-    with pytest.raises(Garbled):
+    with pytest.raises(GarbledFrame):
         Both().far.receive(data)
 
 
@@ -423,7 +423,7 @@ async def test_a_far_side_that_replies_is_kept_and_one_that_is_not_read_yet_is_n
     async with pipe() as (transport, far, data, losses):
         await asyncio.sleep(10 * BEAT)
         transport.start(data.extend, losses.append)
-        asked = Frames()
+        asked = FrameSplitter()
         for _ in range(100):
             await asyncio.sleep(BEAT)
             replies = sum(kind is Kind.BEAT for kind, _ in asked.take(far.recv(1000)))

@@ -16,7 +16,18 @@ import pytest
 
 from multidrop.base.errors import TransportLost
 from multidrop.transports import relay
-from multidrop.transports.relay import CREDIT, GREETING, MOST, SILENCE, Frames, Garbled, Kind, Relay, frame, serve
+from multidrop.transports.relay import (
+    CREDIT,
+    GREETING,
+    MOST_FRAME_BYTES,
+    SILENCE,
+    FrameSplitter,
+    GarbledFrame,
+    Kind,
+    Relay,
+    frame,
+    serve,
+)
 from tests.support.cases import for_each
 
 pytestmark = pytest.mark.fork
@@ -134,7 +145,7 @@ class Bench:
             self.said += data
         greeting, _, rest = bytes(self.said).partition(b"\n")
         assert greeting == GREETING.encode()
-        return list(Frames().take(rest))
+        return list(FrameSplitter().take(rest))
 
     def sent(self) -> bytes:
         """What has come out of the port."""
@@ -170,14 +181,14 @@ def bench() -> Iterator[Bench]:
 def test_both_sides_know_these_bytes_and_numbers() -> None:
     """Another version on the other machine relies on them."""
     assert GREETING == "multidrop-relay 1"
-    assert (CREDIT, MOST, SILENCE, relay.BEAT, relay.MISSED) == (256, 4096, 6.0, 1.5, 3)
+    assert (CREDIT, MOST_FRAME_BYTES, SILENCE, relay.BEAT, relay.MISSED) == (256, 4096, 6.0, 1.5, 3)
     assert frame(Kind.DATA, b"PR P\r") == b"D\x00\x05PR P\r"
     assert [frame(each) for each in Kind] == [bytes([each, 0, 0]) for each in b"DXTPSOL"]
-    assert [int(each) for each in relay.Setting] == [1, 2, 3, 4]
-    (longest,) = Frames().take(b"D\x10\x00" + b"x" * 4096)
+    assert [int(each) for each in relay.PortSetting] == [1, 2, 3, 4]
+    (longest,) = FrameSplitter().take(b"D\x10\x00" + b"x" * 4096)
     assert longest == (Kind.DATA, b"x" * 4096)
-    with pytest.raises(Garbled, match="^44 10 01 is not the beginning of a frame"):
-        list(Frames().take(b"D\x10\x01" + b"x" * 4097))
+    with pytest.raises(GarbledFrame, match="^44 10 01 is not the beginning of a frame"):
+        list(FrameSplitter().take(b"D\x10\x01" + b"x" * 4097))
 
 
 def test_bytes_pass_both_ways_until_the_other_end_is_gone(bench: Bench) -> None:

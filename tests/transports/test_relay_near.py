@@ -16,7 +16,7 @@ import pytest
 
 from multidrop.base.errors import TransportLost
 from multidrop.transports import relay_pipe
-from multidrop.transports.relay import CREDIT, Frames, Kind, frame
+from multidrop.transports.relay import CREDIT, FrameSplitter, Kind, frame
 from multidrop.transports.relay_pipe import RelayControl, RelayEndpoint, RelayPipe, SocketStream
 from tests.support.cases import for_each
 from tests.support.until import until
@@ -64,7 +64,7 @@ class Way:
         """The frames that it took, since the last call."""
         data = bytes(self.there)
         self.there.clear()
-        return list(Frames().take(data))
+        return list(FrameSplitter().take(data))
 
 
 @pytest.fixture
@@ -188,7 +188,7 @@ class Far:
         self.control = RelayControl(self.end, self.change, 9600)
 
     def change(self, made: bytes) -> None:
-        [(kind, payload)] = Frames().take(made)
+        [(kind, payload)] = FrameSplitter().take(made)
         assert kind is Kind.SET
         self.changes.append(payload)
         self.way.back += frame(Kind.OUTCOME, payload[:1] + self.refuses.encode())
@@ -301,7 +301,7 @@ class Open:
     def __init__(self, early: bytes = b"", **more: Any) -> None:
         ours, self.far = socket.socketpair()
         self.far.setblocking(False)
-        self.frames = Frames()
+        self.frames = FrameSplitter()
         self.pipe = RelayPipe(SocketStream("ssh://pc/dev/ttyS0", ours), 9600, early, **more)
         self.data, self.losses = bytearray(), list[TransportLost]()
 

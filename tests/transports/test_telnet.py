@@ -23,7 +23,7 @@ PIECES = st.lists(
     st.one_of(
         st.binary(min_size=1).map(Data),
         st.builds(Option, st.sampled_from([telnet.WILL, telnet.WONT, telnet.DO, telnet.DONT]), st.integers(0, 255)),
-        st.binary(max_size=telnet.LONGEST).map(Subnegotiation),
+        st.binary(max_size=telnet.LONGEST_SUBNEGOTIATION).map(Subnegotiation),
         st.just(Interrupt()),
     )
 )
@@ -67,7 +67,7 @@ def test_a_subnegotiation_without_an_end_keeps_no_more_than_its_length() -> None
     decoder = Decoder()
     assert decoder.receive(b"\xff\xfa" + b"x" * 5000) == []
     (found,) = decoder.receive(b"\xff\xf0")
-    assert found == Subnegotiation(b"x" * telnet.LONGEST)
+    assert found == Subnegotiation(b"x" * telnet.LONGEST_SUBNEGOTIATION)
 
 
 @pytest.mark.parametrize("stray", [b"\xff\xf0", b"\xff\xf1", b"\xff\xf9"])

@@ -25,7 +25,7 @@ from tests.support.cases import for_each
         (telnet.PURGE_RECEIVED, 1),
         (telnet.PURGE_UNSENT, 2),
         (telnet.PURGE_BOTH, 3),
-        (telnet.LONGEST, 256),
+        (telnet.LONGEST_SUBNEGOTIATION, 256),
     ],
 )
 def test_a_number_of_telnet_is_as_the_rfcs_say(number: int, value: int) -> None:

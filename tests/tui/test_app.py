@@ -11,9 +11,9 @@ from multidrop.base.errors import TransportLost
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.shell.events import By, Entered, OnBus, StateChanged
 from multidrop.tui.outbox import BURST
-from multidrop.tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
-from multidrop.tui.readout import State
-from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Offer, TooSmall, offers_like
+from multidrop.tui.polling import LIVELY, OTHERS_PERIOD, PLOT, REST_PERIOD, STATUS
+from multidrop.tui.readout import ReadoutState
+from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, ListedChoice, TooSmall, offers_like
 from multidrop.tui.screens.start import Start
 from tests.support.fake_session import (
     FakeBus,
@@ -199,9 +199,9 @@ async def test_a_picker_narrows_and_a_letter_that_matches_nothing_takes_nothing(
 
 def test_a_picker_takes_the_drive_of_that_address_and_no_part_of_a_word() -> None:
     offers = [
-        Offer("1", "hall a LMDCM", "hall a axle"),
-        Offer("2", "press h LMDCM", "press h right"),
-        Offer("3", "press H LMDCM", "press H hoist"),
+        ListedChoice("1", "hall a LMDCM", "hall a axle"),
+        ListedChoice("2", "press h LMDCM", "press h right"),
+        ListedChoice("3", "press H LMDCM", "press H hoist"),
     ]
     for typed, keys in {"": "123", "h": "231", "H": "321", "l": "", "press:h": "23", "ax": "1", "h z": ""}.items():
         assert "".join(match.key for match in offers_like(offers, typed)) == keys, typed
@@ -254,8 +254,8 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
     press, eth, pmx = (session.buses[name].telemetry for name in ("press", "eth", "pmx"))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert press.polled == {"a": REST, "b": OTHERS, "c": OTHERS}
-        assert (eth.polled, pmx.polled) == ({"": OTHERS}, {}), "a lost bus is not polled"
+        assert press.polled == {"a": REST_PERIOD, "b": OTHERS_PERIOD, "c": OTHERS_PERIOD}
+        assert (eth.polled, pmx.polled) == ({"": OTHERS_PERIOD}, {}), "a lost bus is not polled"
         await pilot.press("ctrl+g", "ctrl+g")
         await emit(pilot, OnBus("press", Sample(session.time, "a", 5, 7)))
         assert press.polled["a"] == PLOT
@@ -275,12 +275,12 @@ async def test_a_drive_that_was_sent_a_line_or_moves_is_looked_at_more_often() -
     polled = session.buses["press"].telemetry
     async with app.run_test(size=(80, 24)) as pilot:
         await emit(pilot, Entered(session.time, "@b MR 5", By.OPERATOR, "press", "b"))
-        assert polled.polled == {"a": REST, "b": LIVELY, "c": OTHERS}
+        assert polled.polled == {"a": REST_PERIOD, "b": LIVELY, "c": OTHERS_PERIOD}
         session.time += 10
         await emit(pilot, OnBus("press", Sample(session.time, "b", 5, 7)))
         assert polled.polled["b"] == LIVELY
         await emit(pilot, OnBus("press", Sample(session.time, "b", 5, 0)))
-        assert polled.polled["b"] == OTHERS
+        assert polled.polled["b"] == OTHERS_PERIOD
 
 
 async def test_a_lost_bus_says_so_on_its_tab_and_the_others_go_on() -> None:
@@ -364,7 +364,7 @@ async def test_ctrl_c_explains_and_ctrl_q_quits() -> None:
 @pytest.fixture
 def heard_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keys count without a pause after a question has come."""
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
 
 
 @pytest.mark.usefixtures("heard_at_once")
@@ -433,7 +433,7 @@ async def test_a_drive_in_program_mode_is_marked_where_lines_are_typed() -> None
         session.buses["press"].drives["a"].programming = True
         await emit(pilot, StateChanged(session.time))
         assert "◆ stores" in app.main.lines("label").plain
-        assert f"◆ {State.STORING.word}" in app.main.lines("status").plain
+        assert f"◆ {ReadoutState.STORING.word}" in app.main.lines("status").plain
 
 
 async def test_the_meaning_of_what_is_typed_stands_beside_it_where_there_is_room() -> None:

@@ -14,10 +14,10 @@ from textual.pilot import Pilot
 from textual.screen import Screen
 from textual.widget import Widget
 
-from multidrop.base.foreign import Guard
+from multidrop.base.foreign import ForeignGuard
 from multidrop.drives.poller import Poller
 from multidrop.drives.stopping import Fate
-from multidrop.shell.channel import Field
+from multidrop.shell.channel import AskedValue
 from multidrop.tui import boundary
 from multidrop.tui.panels import table
 from multidrop.tui.panels.table import LAYOUTS, PANELS
@@ -77,7 +77,7 @@ class Machine:
 @asynccontextmanager
 async def machine(folder: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Machine]:
     monkeypatch.setattr(boundary, "RAISES", False)
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     async with real_screen(folder, size=(210, 50)) as pilot:
         made = Machine(pilot, folder)
         await made.until(lambda: made.session.selected is not None)
@@ -167,10 +167,10 @@ DIALOGS: dict[type[Screen[Any]], Callable[[Any], Screen[Any]]] = {
     dialogs.Ask: lambda app: dialogs.Ask("a name"),
     dialogs.Confirm: lambda app: dialogs.Confirm("Sure?", ["a line"], [("yes", "Yes"), ("no", "No")]),
     dialogs.GoOn: lambda app: dialogs.GoOn("Go on?", lambda pages: None, lambda rows: None),
-    dialogs.Search: lambda app: dialogs.Search("Find", lambda typed: []),
-    dialogs.Choose: lambda app: dialogs.Choose("One of", [dialogs.Offer("a", "a")]),
+    dialogs.SearchDialog: lambda app: dialogs.SearchDialog("Find", lambda typed: []),
+    dialogs.Choose: lambda app: dialogs.Choose("One of", [dialogs.ListedChoice("a", "a")]),
     dialogs.TooSmall: lambda app: dialogs.TooSmall(),
-    dialogs.Form: lambda app: dialogs.Form("Values", [Field("x", "a number", "1", float)]),
+    dialogs.FormDialog: lambda app: dialogs.FormDialog("Values", [AskedValue("x", "a number", "1", float)]),
     start.Start: lambda app: start.Start(nothing, app.assist, app.keyboard, only=False),
 }
 
@@ -275,7 +275,7 @@ async def test_a_defect_of_a_feature_by_others_is_said_once_and_is_not_multidrop
 ) -> None:
     async with machine(tmp_path, monkeypatch) as it:
         await it.begin()
-        it.session.subscribe(Guard("gauge").function(boom))
+        it.session.subscribe(ForeignGuard("gauge").function(boom))
         await it.session.start("@b PR P")
         await it.until(lambda: it.file.exists() and "the feature gauge" in it.file.read_text())
         records = [each.text for each in it.app.main.page("press").records if "a defect" in each.text]  # type: ignore[attr-defined]

@@ -16,7 +16,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
-from multidrop.tui.readout import Readout, State
+from multidrop.tui.readout import Readout, ReadoutState
 from multidrop.tui.screens.controls import ControlsPage, Jog
 from tests.support.fake_session import FakeSession, demo_session, emit, on_screen, press, settle
 
@@ -33,7 +33,9 @@ def at_rest(at: float) -> Readout:
     return readout
 
 
-def allows(jog: Jog, readout: Readout, now: float, *, idle: bool = True, state: State = State.STOPPED) -> bool:
+def allows(
+    jog: Jog, readout: Readout, now: float, *, idle: bool = True, state: ReadoutState = ReadoutState.STOPPED
+) -> bool:
     return jog.allows(readout, readout, state, now, idle=idle)
 
 
@@ -59,15 +61,15 @@ def test_a_held_key_moves_once_however_short_the_move_is() -> None:
 @pytest.mark.parametrize(
     ("state", "idle", "why"),
     [
-        (State.MOVING, True, "it moves"),
-        (State.SILENT, True, "it is silent"),
-        (State.LOST, True, "it is lost"),
-        (State.UNKNOWN, True, "it is not read yet"),
-        (State.STORING, True, "it is storing"),
-        (State.STOPPED, False, "a line is on its way"),
+        (ReadoutState.MOVING, True, "it moves"),
+        (ReadoutState.SILENT, True, "it is silent"),
+        (ReadoutState.LOST, True, "it is lost"),
+        (ReadoutState.UNKNOWN, True, "it is not read yet"),
+        (ReadoutState.STORING, True, "it is storing"),
+        (ReadoutState.STOPPED, False, "a line is on its way"),
     ],
 )
-def test_a_press_is_dropped_unless_the_drive_is_known_to_rest(state: State, idle: bool, why: str) -> None:
+def test_a_press_is_dropped_unless_the_drive_is_known_to_rest(state: ReadoutState, idle: bool, why: str) -> None:
     jog = Jog()
     assert not allows(jog, at_rest(10.0), 10.1, idle=idle, state=state)
     assert (jog.dropped, jog.why) == (1, why)
@@ -76,16 +78,16 @@ def test_a_press_is_dropped_unless_the_drive_is_known_to_rest(state: State, idle
 def test_of_a_lost_drive_nobody_says_that_it_moves() -> None:
     readout = at_rest(9.0)
     readout.take(Sample(10.0, "a", 600, 50_000))
-    assert Jog().obstacle(readout, readout, State.LOST, 10.1) == "it is lost"
-    assert Jog().obstacle(readout, readout, State.MOVING, 10.1) == "it moves"
+    assert Jog().obstacle(readout, readout, ReadoutState.LOST, 10.1) == "it is lost"
+    assert Jog().obstacle(readout, readout, ReadoutState.MOVING, 10.1) == "it moves"
 
 
 def test_an_axis_with_an_error_that_must_be_cleared_is_not_ready() -> None:
     readout = at_rest(10.0)
     readout.condition(10.0, [Conditions(error=128, error_text="plus limit error", clears="CLRX")])
-    assert Jog().obstacle(readout, readout, State.STOPPED, 10.1) == "plus limit error: CLRX clears it"
+    assert Jog().obstacle(readout, readout, ReadoutState.STOPPED, 10.1) == "plus limit error: CLRX clears it"
     readout.condition(10.0, [Conditions(error=86, error_text="stall")])
-    assert Jog().obstacle(readout, readout, State.STOPPED, 10.1) == ""
+    assert Jog().obstacle(readout, readout, ReadoutState.STOPPED, 10.1) == ""
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 0.6), st.booleans()), max_size=40))

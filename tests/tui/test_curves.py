@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.tui.curves.chart import SPANS, Chart, Look, Window
+from multidrop.tui.curves.chart import SPANS, Chart, ChartView, ColumnWindow
 from multidrop.tui.curves.raster import (
     ASCII,
     BLOCK,
@@ -15,10 +15,10 @@ from multidrop.tui.curves.raster import (
     CURSOR,
     INKS,
     Curve,
-    Frame,
     Ink,
+    PlotFrame,
     Raster,
-    Scale,
+    TickScale,
     magnified,
     nice_scale,
     row_of,
@@ -26,7 +26,7 @@ from multidrop.tui.curves.raster import (
     ticks,
     with_cursor,
 )
-from multidrop.tui.curves.samples import KEPT, MOST, Columns, Quantity, Trace, Traces
+from multidrop.tui.curves.samples import KEPT_SECONDS, MOST_POINTS, Columns, Trace, TraceQuantity, Traces
 from multidrop.tui.panels.plotted import role_of
 
 values = st.floats(-2.2e9, 2.2e9, allow_nan=False)
@@ -40,37 +40,37 @@ def trace(*points: tuple[float, float]) -> Trace:
     return found
 
 
-def drawn(found: Trace, span: float, columns: int, rows: int, scale: Scale, ink: Ink = BRAILLE) -> list[str]:
+def drawn(found: Trace, span: float, columns: int, rows: int, scale: TickScale, ink: Ink = BRAILLE) -> list[str]:
     """The picture of a trace from time 0 on."""
     kept = Columns(found, span / columns / ink.wide, 0)
     kept.update(0)
-    frame = Frame(0, columns, rows, scale, ink)
+    frame = PlotFrame(0, columns, rows, scale, ink)
     return ["".join(text for text, _ in row) for row in Raster().draw([Curve(kept, 0)], frame)]
 
 
 def test_a_rising_line_goes_from_the_lower_left_to_the_upper_right() -> None:
     ramp = trace(*((n / 10, n / 10) for n in range(40)))
-    assert drawn(ramp, 4, 2, 2, Scale(0, 4, 1)) == [" ⡼", "⡞⠁"]
-    assert drawn(ramp, 4, 4, 2, Scale(0, 4, 1), BLOCK) == ["  ▄█", "█▀▀ "]
-    assert drawn(ramp, 4, 4, 2, Scale(0, 4, 1), ASCII) == ["  **", "**  "]
+    assert drawn(ramp, 4, 2, 2, TickScale(0, 4, 1)) == [" ⡼", "⡞⠁"]
+    assert drawn(ramp, 4, 4, 2, TickScale(0, 4, 1), BLOCK) == ["  ▄█", "█▀▀ "]
+    assert drawn(ramp, 4, 4, 2, TickScale(0, 4, 1), ASCII) == ["  **", "**  "]
 
 
 def test_a_step_is_one_upright_line() -> None:
     step = trace((0.5, 0), (1.5, 0), (2.5, 4), (3.5, 4))
-    assert drawn(step, 4, 4, 3, Scale(0, 4, 2), ASCII) == ["  **", "  * ", "**  "]
+    assert drawn(step, 4, 4, 3, TickScale(0, 4, 2), ASCII) == ["  **", "  * ", "**  "]
 
 
 def test_where_nothing_is_known_nothing_is_drawn() -> None:
-    assert drawn(trace((0.2, 1), (0.4, 1), (0.6, 1), (9.5, 1)), 10, 10, 1, Scale(0, 2, 1))[0][1:9] == " " * 8
+    assert drawn(trace((0.2, 1), (0.4, 1), (0.6, 1), (9.5, 1)), 10, 10, 1, TickScale(0, 2, 1))[0][1:9] == " " * 8
 
 
 def test_samples_that_come_slowly_are_joined_all_the_same() -> None:
     slow = trace(*((n * 2.0, 1) for n in range(6)))
-    assert " " not in drawn(slow, 10, 10, 1, Scale(0, 2, 1))[0]
+    assert " " not in drawn(slow, 10, 10, 1, TickScale(0, 2, 1))[0]
 
 
 def test_a_value_beyond_the_scale_is_not_drawn_at_its_edge() -> None:
-    assert drawn(trace((0.5, 9), (1.5, 9)), 2, 2, 2, Scale(0, 4, 1)) == ["  ", "  "]
+    assert drawn(trace((0.5, 9), (1.5, 9)), 2, 2, 2, TickScale(0, 4, 1)) == ["  ", "  "]
 
 
 @given(st.lists(st.tuples(times, values), max_size=60).map(sorted), st.integers(1, 80), st.integers(1, 20))
@@ -93,11 +93,11 @@ def test_what_is_drawn_bit_by_bit_is_what_is_drawn_at_once(
         found.add(at, value)
         if data.draw(st.booleans()):
             kept.update(0)
-            raster.draw([Curve(kept, 0)], Frame(data.draw(st.integers(0, 5)), columns, 4, scale, BRAILLE))
+            raster.draw([Curve(kept, 0)], PlotFrame(data.draw(st.integers(0, 5)), columns, 4, scale, BRAILLE))
     kept.update(0)
     once = Columns(found, dot, 0)
     once.update(0)
-    frame = Frame(3, columns, 4, scale, BRAILLE)
+    frame = PlotFrame(3, columns, 4, scale, BRAILLE)
     assert raster.draw([Curve(kept, 0)], frame) == Raster().draw([Curve(once, 0)], frame)
 
 
@@ -105,7 +105,7 @@ def test_a_sample_draws_one_column_and_a_new_column_one_more() -> None:
     found = trace(*((n / 50, n % 7) for n in range(1000)))
     columns, raster = Columns(found, 0.25, 0), Raster()
     columns.update(0)
-    frame = Frame(0, 40, 8, Scale(0, 8, 2), BRAILLE)
+    frame = PlotFrame(0, 40, 8, TickScale(0, 8, 2), BRAILLE)
     raster.draw([Curve(columns, 0)], frame)
     before = raster.drawn
     found.add(20.0, 3)
@@ -119,7 +119,7 @@ def test_two_series_differ_by_dashes_in_braille_and_by_marks_in_ascii() -> None:
     columns = Columns(line, 0.125, 0)
     columns.update(0)
     pictures = [
-        Raster().draw([Curve(columns, number)], Frame(0, 20, 1, Scale(0, 2, 1), BRAILLE))[0][0][0]
+        Raster().draw([Curve(columns, number)], PlotFrame(0, 20, 1, TickScale(0, 2, 1), BRAILLE))[0][0][0]
         for number in range(6)
     ]
     assert len(set(pictures)) == 6
@@ -130,7 +130,7 @@ def test_twelve_curves_differ_by_colour_or_dashes_and_in_ascii_by_marks() -> Non
     line = trace(*((n / 10, 1) for n in range(100)))
     columns = Columns(line, 0.125, 0)
     columns.update(0)
-    frame = Frame(0, 20, 1, Scale(0, 2, 1), BRAILLE)
+    frame = PlotFrame(0, 20, 1, TickScale(0, 2, 1), BRAILLE)
     pictures = {(role_of(n), Raster().draw([Curve(columns, n)], frame)[0][0][0]) for n in range(12)}
     assert len(pictures) == len({ASCII.sample(n) for n in range(12)}) == 12
 
@@ -167,7 +167,7 @@ def test_ticks_are_round_the_same_rows_apart_and_not_many(low: float, span: floa
 
 @given(st.sampled_from(SPANS), st.integers(18, 240))
 def test_ticks_of_time_are_the_same_cells_apart(span: float, columns: int) -> None:
-    look = Look()
+    look = ChartView()
     look.shorter(SPANS.index(look.span) - SPANS.index(span))
     window = look.window(1000.0, columns, 2)
     cells = window.step / window.cell
@@ -188,7 +188,7 @@ def test_a_scale_grows_at_once_and_shrinks_only_when_much_too_wide() -> None:
 
 
 def test_a_magnified_scale_is_a_round_part_around_a_value() -> None:
-    found = magnified(Scale(0, 1000, 200), 11, 4, 500)
+    found = magnified(TickScale(0, 1000, 200), 11, 4, 500)
     assert found.low <= 400 and found.high >= 600 and found.high - found.low <= 500
 
 
@@ -197,9 +197,9 @@ def test_a_magnified_scale_is_a_round_part_around_a_value() -> None:
 
 def test_a_trace_keeps_minutes_and_not_more() -> None:
     found = trace(*((n / 10, n) for n in range(12_000)))
-    assert KEPT < found.at[-1] - found.at[0] < KEPT + 250
+    assert KEPT_SECONDS < found.at[-1] - found.at[0] < KEPT_SECONDS + 250
     assert found.count == 12_000
-    assert len(trace(*((n / 1e6, n) for n in range(MOST + 5000))).at) <= MOST
+    assert len(trace(*((n / 1e6, n) for n in range(MOST_POINTS + 5000))).at) <= MOST_POINTS
 
 
 def test_columns_that_are_long_past_are_forgotten() -> None:
@@ -213,21 +213,21 @@ def test_columns_that_are_long_past_are_forgotten() -> None:
 
 def test_a_closed_bus_leaves_nothing() -> None:
     traces = Traces()
-    traces.add(Quantity("press", "a", "", "position"), 1.0, 2.0)
+    traces.add(TraceQuantity("press", "a", "", "position"), 1.0, 2.0)
     traces.rename("press", "left")
-    assert traces.get(Quantity("left", "a", "", "position")) is not None
+    assert traces.get(TraceQuantity("left", "a", "", "position")) is not None
     traces.forget("left")
-    assert traces.get(Quantity("press", "a", "", "position")) is None
+    assert traces.get(TraceQuantity("press", "a", "", "position")) is None
 
 
 def test_a_view_that_goes_back_in_time_finds_what_is_kept() -> None:
-    traces, quantity = Traces(), Quantity("press", "a", "", "position")
+    traces, quantity = Traces(), TraceQuantity("press", "a", "", "position")
     for n in range(3000):
         traces.add(quantity, n / 10, n)
     chart = Chart()
-    newest = chart.take(traces, [quantity], Window(20.0, 1400, 100, 2))
+    newest = chart.take(traces, [quantity], ColumnWindow(20.0, 1400, 100, 2))
     assert newest[quantity].low == pytest.approx(2800, abs=3)
-    back = chart.take(traces, [quantity], Window(20.0, 100, 100, 2))
+    back = chart.take(traces, [quantity], ColumnWindow(20.0, 100, 100, 2))
     assert (back[quantity].low, back[quantity].high) == (pytest.approx(200, abs=3), pytest.approx(400, abs=3))
 
 
@@ -235,7 +235,7 @@ def test_a_view_that_goes_back_in_time_finds_what_is_kept() -> None:
 
 
 def test_a_pause_holds_the_picture_and_the_cursor_pauses() -> None:
-    look = Look()
+    look = ChartView()
     look.pause(100.0)
     assert look.window(110.0, 40, 2) == look.window(100.0, 40, 2)
     look.pause(110.0)
@@ -248,7 +248,7 @@ def test_a_pause_holds_the_picture_and_the_cursor_pauses() -> None:
     st.lists(st.sampled_from(["left", "right", "far", "longer", "shorter", "closer", "farther", "pause"]), max_size=60)
 )
 def test_the_cursor_is_always_in_view(keys: list[str]) -> None:
-    look, now = Look(), 1000.0
+    look, now = ChartView(), 1000.0
     for key in keys:
         now += 0.1
         match key:

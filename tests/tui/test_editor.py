@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.program_files import Part
+from multidrop.dialects.program_files import LinePart
 from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.shell.state.backups import Drafts
 from multidrop.tui.editor import MacroGrammar, grammar_of
@@ -106,9 +106,9 @@ def test_files_are_found_by_name_and_by_folder(tmp_path: Path, monkeypatch: pyte
     assert files_in("nowhere/") == []
 
 
-def no_parts(line: str) -> list[Part]:
+def no_parts(line: str) -> list[LinePart]:
     at = line.find("'")
-    return [Part(at, len(line), "remark")] if at >= 0 else []
+    return [LinePart(at, len(line), "remark")] if at >= 0 else []
 
 
 def test_a_program_is_found_in_its_file_whatever_its_remarks_and_blanks() -> None:

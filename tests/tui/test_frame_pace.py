@@ -2,13 +2,13 @@
 
 import pytest
 
-from multidrop.tui.frame_scheduler import PATIENCE, TRIES, Pace
+from multidrop.tui.frame_scheduler import MOST_UNANSWERED, REPLY_TIMEOUT, TerminalPace
 
 
 class Screen:
     def __init__(self):
         self.now, self.handed_over = 0.0, True
-        self.pace = Pace(lambda: self.now, lambda: self.handed_over)
+        self.pace = TerminalPace(lambda: self.now, lambda: self.handed_over)
 
     def frame(self):
         """True if a frame goes out now, with a query after it."""
@@ -48,30 +48,30 @@ def test_a_terminal_that_answers_gets_a_frame_for_each_answer(screen):
 
 def test_a_terminal_that_never_answers_gets_every_frame_and_is_asked_a_few_times_only(screen):
     asked = [screen.frame() for _ in range(100)]
-    assert None not in asked and asked.count(True) == TRIES
+    assert None not in asked and asked.count(True) == MOST_UNANSWERED
 
 
 def test_one_that_ceases_to_answer_is_waited_for_a_few_times_and_then_gets_every_frame(screen):
     answering(screen)
     waited = 0
-    for _ in range(TRIES):
+    for _ in range(MOST_UNANSWERED):
         assert screen.frame() is True
         assert screen.frame() is None
-        screen.now += PATIENCE
+        screen.now += REPLY_TIMEOUT
         waited += 1
-    assert waited == TRIES
+    assert waited == MOST_UNANSWERED
     for _ in range(50):
         screen.now += 0.001
         assert screen.frame() is not None
-    screen.now += PATIENCE
+    screen.now += REPLY_TIMEOUT
     assert screen.frame() is True, "it is asked again, should it answer one day"
 
 
 def test_an_answer_that_comes_late_brings_the_waiting_back(screen):
     answering(screen)
-    for _ in range(TRIES + 1):
+    for _ in range(MOST_UNANSWERED + 1):
         screen.frame()
-        screen.now += PATIENCE
+        screen.now += REPLY_TIMEOUT
     assert screen.frame() is not None
     screen.pace.answered()
     assert screen.frame() is True

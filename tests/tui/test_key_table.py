@@ -12,13 +12,13 @@ from textual import events
 from textual.pilot import Pilot
 
 from multidrop.base.files import rows
-from multidrop.shell.channel import Field as Wanted
+from multidrop.shell.channel import AskedValue
 from multidrop.tui import palette
-from multidrop.tui.actions import Actions
+from multidrop.tui.actions import ScreenActions
 from multidrop.tui.app import MultidropApp, bindings
 from multidrop.tui.key_table import SHEETS, all_groups
 from multidrop.tui.keymap import keymap
-from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.dialogs import InputField
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import PAGES
 from tests.support import key_docs
@@ -118,7 +118,7 @@ async def walked(pilot: Pilot[int], session: FakeSession, name: str, keys: Itera
             await pilot.pause()
         if name != "main" and app.screen is app.main:
             await app.run_action(f"act.page('{name}')")
-        if name != "main" and isinstance(app.focused, Field) or app.screen is not screen:
+        if name != "main" and isinstance(app.focused, InputField) or app.screen is not screen:
             await settle(pilot)  # a field that the stop has closed, or another page
             screen = app.screen
         assert noticed(app, key), f"{key} on {name}"
@@ -161,7 +161,7 @@ async def opened(app: MultidropApp, name: str) -> None:
     elif name == "question":
         app.run_worker(app.questions.go_on("Send it?"))
     else:
-        app.run_worker(app.questions.fill("go", [Wanted("speed", "a number", "5", lambda text: "")]))
+        app.run_worker(app.questions.fill("go", [AskedValue("speed", "a number", "5", lambda text: "")]))
 
 
 BOXES = {
@@ -195,7 +195,7 @@ async def test_every_key_of_a_box_is_noticed_and_the_stop_works_after_it(name: s
 
 
 def test_every_command_of_the_palette_has_an_action_and_a_key_that_can_be_set() -> None:
-    targets = {"act": Actions, "app": MultidropApp, "": MainScreen}
+    targets = {"act": ScreenActions, "app": MultidropApp, "": MainScreen}
     named = keymap(bindings(), {}).keys
     for row in rows(palette.__file__, "commands.csv"):
         target, _, action = row["action"].partition("(")[0].rpartition(".")

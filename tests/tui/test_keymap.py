@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.binding import Binding
 
-from multidrop.shell.configuration import Look
+from multidrop.shell.configuration import ScreenSettings
 from multidrop.tui.app import MultidropApp, bindings
 from multidrop.tui.keymap import FunctionKeys, keymap, read_key
 from multidrop.tui.screens.all_drives import AllDrives
-from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.dialogs import SearchDialog
 from multidrop.tui.screens.page import PAGES, Page, PageEntry
 from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import FakeAssist, FakeMacro, FakeMacros, demo_session, press, settle
@@ -86,7 +86,9 @@ def test_whatever_is_set_the_stop_stays_the_stop_and_every_function_has_its_own_
 
 @pytest.mark.tui
 async def test_a_key_that_was_set_works_and_is_shown() -> None:
-    look = Look(signs="full", keys={"palette": "^D", "page-drives": "F9", "play-f9": "Ctrl+F9"}, where="multidrop.toml")
+    look = ScreenSettings(
+        signs="full", keys={"palette": "^D", "page-drives": "F9", "play-f9": "Ctrl+F9"}, where="multidrop.toml"
+    )
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
@@ -94,11 +96,11 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
         await pilot.press("ctrl+p")
         assert app.screen is app.main
         await pilot.press("ctrl+d")
-        assert isinstance(app.screen, Search)
+        assert isinstance(app.screen, SearchDialog)
         await pilot.press("escape", "f9")
         assert isinstance(app.screen, AllDrives)
         await pilot.press("ctrl+d")
-        assert isinstance(app.screen, Search)
+        assert isinstance(app.screen, SearchDialog)
         await press(pilot, "ctrl+x")
         assert app.session.stops == 1
 
@@ -107,7 +109,7 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
 async def test_a_wrong_setting_is_said_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("multidrop.toml").write_text('[screen]\ntheme = "no-such"\nsigns = "ascii"\n[keys]\nnothing = "^D"\n')
-    look = Look("no-such", "ascii", keys={"nothing": "^D"}, where="multidrop.toml")
+    look = ScreenSettings("no-such", "ascii", keys={"nothing": "^D"}, where="multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
@@ -119,7 +121,7 @@ async def test_a_wrong_setting_is_said_at_the_start(tmp_path: Path, monkeypatch:
 
 @pytest.mark.tui
 async def test_ctrl_a_goes_to_the_start_of_a_line_and_from_there_to_all_drives() -> None:
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=Look(signs="full"))
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=ScreenSettings(signs="full"))
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press(*"R 5", "ctrl+a", "M")
         assert app.main.entry.value == "MR 5"
@@ -131,10 +133,10 @@ async def test_ctrl_a_goes_to_the_start_of_a_line_and_from_there_to_all_drives()
 
 @pytest.mark.tui
 async def test_help_is_for_where_you_are_and_can_be_searched() -> None:
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=Look(signs="full"))
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=ScreenSettings(signs="full"))
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+a", "f1")
-        assert isinstance(app.screen, Search)
+        assert isinstance(app.screen, SearchDialog)
         shown = [match.text.plain for match in app.screen.found]
         assert shown[0] == "All drives" and shown[1].startswith("Every drive of every line has a row")
         assert shown[2] == "Rows" and shown[3].startswith("↑↓")
@@ -148,10 +150,10 @@ async def test_help_is_for_where_you_are_and_can_be_searched() -> None:
 
 @pytest.mark.tui
 async def test_what_was_used_lately_comes_after_the_stop() -> None:
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=Look(signs="full"))
+    app = MultidropApp(demo_session(), (), FakeAssist(), look=ScreenSettings(signs="full"))
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+p", *"mouse off", "enter", "ctrl+p")
-        assert isinstance(app.screen, Search)
+        assert isinstance(app.screen, SearchDialog)
         first, second = app.screen.found[:2]
         assert first.text.plain.startswith("Stop all") and first.text.plain.endswith("^X")
         assert second.text.plain.startswith("Mouse on")

@@ -13,7 +13,7 @@ from textual import constants
 
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.terminal import keyboard
-from multidrop.tui.widgets.entry import Draft
+from multidrop.tui.widgets.entry import LineDraft
 from multidrop.tui.widgets.lines import width_of
 from tests.support.examples import examples
 from tests.support.fake_session import FakeAssist, demo_session
@@ -91,7 +91,7 @@ class Bench:
 
     def _state(self) -> dict[str, object]:
         main = self.screen.app.main
-        before: Draft = main.entry.exchange()
+        before: LineDraft = main.entry.exchange()
         main.entry.exchange(before)
         return {
             "sent": list(self.session.sent),
@@ -117,11 +117,11 @@ class Bench:
 def bench() -> Iterator[Bench]:
     before = constants.ESCAPE_DELAY
     constants.ESCAPE_DELAY = 60.0  # type: ignore[misc]  # a busy machine makes no Escape of a divided sequence
-    pause, keyboard.PAUSE = keyboard.PAUSE, 1e6  # nor a pause after a question
+    pause, keyboard.DEAF_TIME = keyboard.DEAF_TIME, 1e6  # nor a pause after a question
     made = Bench()
     yield made
     made.close()
-    keyboard.PAUSE = pause
+    keyboard.DEAF_TIME = pause
     constants.ESCAPE_DELAY = before  # type: ignore[misc]
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from textual import constants, events
 from textual.message import Message
 
-from multidrop.tui.terminal.keystream import MOST, STALLED, KeyStream, Kind, Piece, Splitter
+from multidrop.tui.terminal.keystream import LONGEST_PASTE, PASTE_TIMEOUT, InputPiece, KeyStream, PieceKind, Splitter
 
 PASTE = b"\x1b[200~MR 1\rMR 2\r\x1b[201~"
 TYPED: dict[bytes, list[str]] = {
@@ -75,12 +75,12 @@ def test_pieces_do_not_depend_on_where_the_text_is_cut(texts: list[bytes], cuts:
     assert joined(found) == joined(whole)
 
 
-def joined(pieces: list[Piece]) -> list[Piece]:
+def joined(pieces: list[InputPiece]) -> list[InputPiece]:
     """Join neighbouring texts."""
-    found: list[Piece] = []
+    found: list[InputPiece] = []
     for piece in pieces:
-        if found and piece.kind is found[-1].kind is Kind.TEXT:
-            found[-1] = Piece(Kind.TEXT, found[-1].text + piece.text)
+        if found and piece.kind is found[-1].kind is PieceKind.TEXT:
+            found[-1] = InputPiece(PieceKind.TEXT, found[-1].text + piece.text)
         else:
             found.append(piece)
     return found
@@ -154,7 +154,7 @@ async def test_a_paste_that_does_not_end_says_so_and_ctrl_c_leaves_it() -> None:
     session.stream.take(b"\x1b[200~MR 1\r")
     session.stream.take(b"\x03")
     assert session.told == [], "it goes on: this belongs to it"
-    await asyncio.sleep(STALLED + 0.1)
+    await asyncio.sleep(PASTE_TIMEOUT + 0.1)
     assert session.told == ["a paste has not ended; until it does, keys belong to it. Ctrl+C drops it"]
     session.stream.take(b"\x03")
     session.stream.take(b"M")
@@ -164,14 +164,14 @@ async def test_a_paste_that_does_not_end_says_so_and_ctrl_c_leaves_it() -> None:
 
 async def test_a_paste_that_is_too_long_is_dropped_whole() -> None:
     session = SessionView()
-    session.stream.take(b"\x1b[200~" + b"MR 5\r" * (MOST // 4) + b"\x1b[201~M")
+    session.stream.take(b"\x1b[200~" + b"MR 5\r" * (LONGEST_PASTE // 4) + b"\x1b[201~M")
     assert await session.done() == ["M"]
     assert session.told == ["a paste of more than 1048576 characters was dropped"]
 
 
 async def test_more_than_anybody_means_is_dropped_whole() -> None:
     session = SessionView()
-    session.stream.take(b"MR 5\r" * (MOST // 4))
+    session.stream.take(b"MR 5\r" * (LONGEST_PASTE // 4))
     assert await session.done() == []
     assert "all of it was dropped" in session.told[0]
     session.stream.take(b"M")

@@ -116,7 +116,7 @@ async def test_keys_typed_before_the_question_answer_nothing_and_after_a_no_the_
 
 
 async def test_lines_that_wait_are_asked_about_and_sent_after_a_no(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     session = demo_session()
     session.gate = asyncio.Event()
     async with demo(session) as (screen, _, _):
@@ -132,7 +132,7 @@ async def test_lines_that_wait_are_asked_about_and_sent_after_a_no(monkeypatch: 
 
 
 async def test_lines_that_wait_are_named_after_a_yes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     session = demo_session()
     session.gate = asyncio.Event()
     async with demo(session) as (screen, _, _):
@@ -150,7 +150,7 @@ async def test_lines_that_wait_are_named_after_a_yes(monkeypatch: pytest.MonkeyP
 async def test_a_paste_is_sent_as_far_as_its_quit_or_close(
     tmp_path: Path, close: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     async with real(tmp_path) as (screen, session):
         a, b = (session.buses["press"].drives[name] for name in "ab")
         screen.write(b"\x1b[200~MR 1\r" + close + b"\rSL 200000\r@b SL 5\r\x1b[201~")
@@ -169,7 +169,7 @@ async def test_a_paste_is_sent_as_far_as_its_quit_or_close(
 
 
 async def test_a_macro_with_a_quit_that_is_declined_ends_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     async with real(tmp_path) as (screen, session):
         await session.run("/record m")
         for line in ("/quit", "SL 200000"):

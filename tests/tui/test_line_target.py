@@ -11,9 +11,9 @@ from textual.message import Message
 
 from multidrop.drives.events import Sample
 from multidrop.shell.events import Failed, OnBus, StateChanged
-from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.dialogs import Confirm, SearchDialog
 from multidrop.tui.screens.start import Start
-from multidrop.tui.terminal.keyboard import PAUSE
+from multidrop.tui.terminal.keyboard import DEAF_TIME
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, demo_session
 from tests.support.pty_screen import demo, on_a_pty
 from tests.support.real_screen import real_app
@@ -79,7 +79,7 @@ async def test_a_selection_that_changes_by_itself_takes_no_key_until_there_is_a_
         await screen.shows(
             "the screen changed while you typed: these keys were dropped; keys count again after a", "eth"
         )
-        await asyncio.sleep(PAUSE + 0.1)
+        await asyncio.sleep(DEAF_TIME + 0.1)
         await screen.type(b"PR P\r", BUS_1)
         assert session.sent == ["eth: PR P"]
         assert screen.app.main.entry.value == "MR 512"
@@ -120,7 +120,7 @@ async def test_an_enter_that_comes_with_a_paste_does_not_answer_its_question() -
         await screen.type(b"\x1b[200~MR 1\rMR 2\r\x1b[201~\r")
         assert isinstance(screen.app.screen, Confirm)
         assert session.sent == []
-        await asyncio.sleep(PAUSE + 0.1)
+        await asyncio.sleep(DEAF_TIME + 0.1)
         await screen.type(b"\r")
         assert session.sent == ["press:a MR 1", "press:a MR 2"]
 
@@ -176,7 +176,7 @@ async def test_ctrl_r_searches_the_history_and_takes_a_line_without_sending_it()
     async with demo() as (screen, session, assist):
         assist.kept += ["MR 100", "/wait stopped", "MR 512000", "SL 5"]
         await screen.type(b"PR\x12mr")
-        assert isinstance(screen.app.screen, Search)
+        assert isinstance(screen.app.screen, SearchDialog)
         assert [match.key for match in screen.app.screen.found] == ["MR 512000", "MR 100"]
         await screen.type(b"\x12\r")
         assert screen.app.main.entry.value == "MR 100"
@@ -195,7 +195,7 @@ async def test_escape_leaves_the_search_and_the_line_as_it_was() -> None:
 async def test_what_is_nowhere_in_the_history_takes_nothing() -> None:
     async with demo() as (screen, session, _):
         await screen.type(b"PR\x12nowhere\r")
-        assert isinstance(screen.app.screen, Search)
+        assert isinstance(screen.app.screen, SearchDialog)
         assert session.sent == []
 
 
@@ -257,7 +257,7 @@ async def test_to_quit_right_behind_the_enter_that_opens_a_bus_is_to_quit() -> N
 async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(
     opened: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     session = demo_session()
     session.busy = True
     async with demo(session) as (screen, _, _):
@@ -281,7 +281,7 @@ async def test_a_paste_into_what_takes_no_text_is_not_asked_about_later(
 
 
 async def test_keys_typed_as_the_terminal_grows_again_are_not_half_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 1e6)  # keys count once the test says so
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 1e6)  # keys count once the test says so
     async with demo() as (screen, session, _):
         await screen.type(b"MR 5")
         screen.resize(40, 10)

@@ -8,7 +8,7 @@ from textual.widgets import Static
 from multidrop.drives.events import Sample
 from multidrop.shell.events import OnBus
 from multidrop.tui.screens.all_drives import AllDrives
-from multidrop.tui.screens.dialogs import Options, Search
+from multidrop.tui.screens.dialogs import ChoiceList, SearchDialog
 from tests.support.fake_session import (
     FakeBus,
     FakeDrive,
@@ -30,8 +30,8 @@ async def test_a_box_says_how_many_rows_are_below_and_follows_the_wheel() -> Non
     async with on_screen(many()) as (pilot, app, _):
         await press(pilot, "ctrl+o")
         box = app.screen
-        assert isinstance(box, Search)
-        options = box.query_one(Options)
+        assert isinstance(box, SearchDialog)
+        options = box.query_one(ChoiceList)
         below = 40 - options.size.height
         assert f"▼ {below} below" in str(box.query_one(".keys", Static).content)
         options.scroll_relative(y=5, animate=False)
@@ -44,7 +44,7 @@ async def test_a_box_says_how_many_rows_are_below_and_follows_the_wheel() -> Non
 async def test_a_box_that_is_closed_before_its_rows_are_laid_out_counts_none() -> None:
     async with on_screen(many()) as (pilot, app, _):
         await press(pilot, "ctrl+o")
-        options = app.screen.query_one(Options)
+        options = app.screen.query_one(ChoiceList)
         await press(pilot, "escape")
         assert app.screen is app.main
         options.tell_below()  # what comes after a refresh comes after the box, where the machine is busy
@@ -53,7 +53,7 @@ async def test_a_box_that_is_closed_before_its_rows_are_laid_out_counts_none() -
 async def test_a_click_on_a_row_of_a_box_takes_it() -> None:
     async with on_screen(many()) as (pilot, app, session):
         await press(pilot, "ctrl+o")
-        await pilot.click(Options, offset=(5, 3))
+        await pilot.click(ChoiceList, offset=(5, 3))
         await settle(pilot)
         assert app.screen is app.main
         assert session.selected is not None and session.selected.address == "03"
@@ -110,6 +110,6 @@ async def test_the_palette_has_the_functions_of_the_page_first() -> None:
     async with on_screen() as (pilot, app, _):
         await app.run_action("act.page('parameters')")
         await press(pilot, "ctrl+p")
-        assert isinstance(app.screen, Search)
+        assert isinstance(app.screen, SearchDialog)
         titles = [match.text.plain.split("  ")[0] for match in app.screen.found]
         assert titles[:3] == ["Stop all", "Save", "Read again"]

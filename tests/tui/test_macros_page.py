@@ -12,7 +12,7 @@ from textual import events
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
 from multidrop.tui.frame_scheduler import Frames
-from multidrop.tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
+from multidrop.tui.screens.macros import ListedMacro, MacrosPage, macro_row, step_rows
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.traffic import TrafficPage
 from tests.support.fake_session import FakeMacro, demo_session, emit, make_app, on_screen, press, settle
@@ -27,13 +27,13 @@ def text(row: tuple[tuple[str, str], ...]) -> str:
 
 
 def test_a_macro_shows_its_key_with_the_page_and_a_broken_file_its_reason() -> None:
-    row = text(macro_row(Listed("lift", FakeMacro("lift", "F3", "up", "2")), None, 80, True))  # type: ignore[arg-type]
+    row = text(macro_row(ListedMacro("lift", FakeMacro("lift", "F3", "up", "2")), None, 80, True))  # type: ignore[arg-type]
     assert row.startswith("▸lift") and "F3.2" in row and row.rstrip().endswith("up")
-    assert "✗ no name" in text(macro_row(Listed("bad", None, "no name"), None, 80, False))
+    assert "✗ no name" in text(macro_row(ListedMacro("bad", None, "no name"), None, 80, False))
 
 
 def test_the_step_of_a_macro_that_plays_is_marked_and_kept_in_view() -> None:
-    each = Listed("long", FakeMacro("long", lines=tuple(f"MR {n}" for n in range(50))))  # type: ignore[arg-type]
+    each = ListedMacro("long", FakeMacro("long", lines=tuple(f"MR {n}" for n in range(50))))  # type: ignore[arg-type]
     playing = SimpleNamespace(name="long", step=40, steps=50, short="")
     rows = [text(row) for row in step_rows(each, playing, 40, 5)]
     assert len(rows) == 5 and [row for row in rows if "▶" in row] == [" ▶  40  MR 39".ljust(40)]

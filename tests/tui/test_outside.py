@@ -19,7 +19,7 @@ from multidrop.shell.programs.edited_file import EditedFile, Outside
 from multidrop.shell.state.backups import Copy, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens import program_file
-from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.dialogs import Confirm, SearchDialog
 from multidrop.tui.screens.macros import MacrosPage
 from multidrop.tui.screens.parameters import ParametersPage
 from multidrop.tui.screens.program import ProgramPage
@@ -48,8 +48,8 @@ class KeepingAssist(FakeAssist):
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 0.02)
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)  # nobody types before a box is seen, here
+    monkeypatch.setattr("multidrop.tui.screens.program.CHECK_DELAY", 0.02)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)  # nobody types before a box is seen, here
     (tmp_path / "a.mxt").write_text(TEXT)
     return tmp_path
 
@@ -241,12 +241,12 @@ async def test_a_file_that_is_opened_again_is_read_again(folder: Path) -> None:
     async with page(folder) as pilot:
         (folder / "b.mxt").write_text("' b\n")
         typed(pilot, "ctrl+e")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Search))
+        await until(pilot, lambda: isinstance(pilot.app.screen, SearchDialog))
         typed(pilot, "b.mxt", "enter")
         await until(pilot, lambda: shown(pilot).editor.text == "' b\n")
         (folder / "a.mxt").write_text(OTHER)
         typed(pilot, "ctrl+e")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Search))
+        await until(pilot, lambda: isinstance(pilot.app.screen, SearchDialog))
         typed(pilot, "a.mxt", "enter")
         await until(pilot, lambda: shown(pilot).editor.text == OTHER)
         assert told(pilot, "it was read again") == 1
@@ -302,7 +302,7 @@ async def test_the_text_of_a_file_that_is_gone_is_not_called_saved(folder: Path)
 async def test_the_heading_names_a_change_while_the_page_is_shown(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(program_file, "LOOK", 0.0)
+    monkeypatch.setattr(program_file, "LOOK_PERIOD", 0.0)
     async with page(folder) as pilot:
         (folder / "a.mxt").write_text(OTHER)
 
@@ -375,7 +375,7 @@ async def test_the_copy_of_an_edit_of_another_content_is_not_saved_unasked(folde
     (folder / "b.mxt").write_text("' another's\n")
     async with page(folder) as pilot:
         typed(pilot, "ctrl+e")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Search))
+        await until(pilot, lambda: isinstance(pilot.app.screen, SearchDialog))
         typed(pilot, "b.mxt", "enter")
         asked = await question(pilot, "A text that was not saved")
         assert any("The file has changed since then" in line for line in asked.lines)
@@ -397,7 +397,7 @@ async def test_a_break_point_goes_to_the_line_that_is_shown_right_after_an_edit(
         session_of(pilot).emit(ProgramRead(68.0, "press", "a", (), False))  # a download began
         await until(pilot, lambda: not shown(pilot).findings.addresses and not shown(pilot).findings.pending)
         typed(pilot, "ctrl+r")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Search))
+        await until(pilot, lambda: isinstance(pilot.app.screen, SearchDialog))
         assert "may be another one" in pilot.app.screen.heading  # type: ignore[attr-defined]
 
 
@@ -443,7 +443,7 @@ async def with_macros(folder: Path) -> AsyncIterator[tuple[Pilot[int], Multidrop
 
 def pause(monkeypatch: pytest.MonkeyPatch) -> None:
     """No press is the repetition of a held key."""
-    monkeypatch.setattr("multidrop.tui.keymap.HELD", 0.0)
+    monkeypatch.setattr("multidrop.tui.keymap.REPEATED_WITHIN", 0.0)
 
 
 async def test_a_key_plays_a_macro_that_changed_on_the_disk_at_its_second_press(

@@ -10,7 +10,7 @@ from multidrop.tui.app import MultidropApp
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.polling import CONDITIONS, CONDITIONS_OF_OTHERS
 from multidrop.tui.readout import Readout
-from multidrop.tui.screens.all_drives import AllDrives, Place, drive_row
+from multidrop.tui.screens.all_drives import AllDrives, DriveOnLine, drive_row
 from multidrop.tui.screens.page import ListPage, Page
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import (
@@ -182,7 +182,7 @@ async def test_what_is_typed_on_the_page_of_all_drives_chooses_an_address_and_en
 def test_a_row_fits_and_shows_the_trouble_at_every_width(width: int) -> None:
     readout = Readout()
     readout.take(Sample(1.0, "a", -2_147_483_648, 5_000_000, "", "limit+"))
-    row = drive_row(Place("gantry-left", Glance("a", "a-long-name", "LMDCM", "", readout)), 1.0, width, True)
+    row = drive_row(DriveOnLine("gantry-left", Glance("a", "a-long-name", "LMDCM", "", readout)), 1.0, width, True)
     assert width_of(row) == width
     assert "✗ limi" in "".join(text for text, _ in row)
 

@@ -15,10 +15,10 @@ from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.tui.curves.raster import ASCII
-from multidrop.tui.curves.samples import Quantity
-from multidrop.tui.curves.trigger import State
+from multidrop.tui.curves.samples import TraceQuantity
+from multidrop.tui.curves.trigger import TriggerState
 from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.dialogs import InputField
 from multidrop.tui.screens.plot_page import PlotPage, cursor_rows, parse_trigger, typed_trigger
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, on_screen, press, settle
@@ -269,18 +269,20 @@ async def test_a_trigger_holds_the_picture_around_the_edge_and_space_waits_for_t
         session.emit(*rest("a", 5, session))
         await press(pilot, "ctrl+g", "g")
         field = app.focused
-        assert isinstance(field, Field) and field.value.startswith("a velocity rise ")
+        assert isinstance(field, InputField) and field.value.startswith("a velocity rise ")
         field.value = "a velocity rise 1000 25%"
         await press(pilot, "enter")
         look = app.model.look
-        assert look.trigger.state is State.ARMED and look.paused_at is None
+        assert look.trigger.state is TriggerState.ARMED and look.paused_at is None
         assert "armed a velocity rise 1000 25%" in app.screen.lines("heading").plain
         assert session.buses["press"].telemetry.polled["a"] == 0.02
         session.emit(*run_up(session, session.time))
         session.time += 5
         app.model.changed = True
         await settle(pilot)
-        assert look.trigger.state is State.TRIGGERED and look.trigger.at == pytest.approx(session.time - 3, abs=0.06)
+        assert look.trigger.state is TriggerState.TRIGGERED and look.trigger.at == pytest.approx(
+            session.time - 3, abs=0.06
+        )
         assert look.paused_at == pytest.approx(look.trigger.at + 15)
         assert "╵edge" in app.screen.lines("charts").plain and "▸" in app.screen.lines("charts").plain
         session.time += 30
@@ -303,10 +305,10 @@ async def test_the_stop_goes_first_whatever_the_page_of_plots_waits_for(keys: st
     async with on_screen() as (pilot, app, session):
         session.emit(*wave("a", session))
         await press(pilot, "ctrl+g", *keys.split())
-        assert isinstance(app.focused, Field) == (keys in ("g", "j", "ctrl+s"))
+        assert isinstance(app.focused, InputField) == (keys in ("g", "j", "ctrl+s"))
         await press(pilot, "ctrl+x")
         assert session.stops == 1 and isinstance(app.screen, PlotPage)
-        assert not isinstance(app.focused, Field), "what was begun before a stop is not used"
+        assert not isinstance(app.focused, InputField), "what was begun before a stop is not used"
 
 
 @pytest.mark.tui
@@ -346,7 +348,7 @@ def test_a_trigger_is_typed_in_the_unit_that_is_shown_and_shown_as_it_was_typed(
     shown = view(session, *wave("a", session))
     assert typed_trigger(shown).startswith("a velocity rise ")
     setting = parse_trigger(shown, "press:a position fall -100 50%")
-    assert setting == (Quantity("press", "a", "", "position"), -100, False, 0.5)
+    assert setting == (TraceQuantity("press", "a", "", "position"), -100, False, 0.5)
     shown.model.look.arm(setting, False, shown.model.traces)
     assert typed_trigger(shown) == "a position fall -100 50%"
 
@@ -359,9 +361,9 @@ async def test_what_is_visible_is_saved_as_a_table_and_nothing_is_overwritten(tm
         await press(pilot, "ctrl+g", "minus", "plus", "plus", "plus", "ctrl+s")  # the last 5 s
         file = tmp_path / "seen.csv"
         for expected in ("196 values of 2 curves are in", "is there already; use another name"):
-            if not isinstance(app.focused, Field):
+            if not isinstance(app.focused, InputField):
                 await press(pilot, "ctrl+s")
-            assert isinstance(app.focused, Field)
+            assert isinstance(app.focused, InputField)
             app.focused.value = str(file)
             await press(pilot, "enter")
             await app.workers.wait_for_complete()
@@ -392,7 +394,7 @@ async def test_what_cannot_be_saved_has_one_line(
     async with on_screen() as (pilot, app, session):
         session.emit(*wave("a", session))
         await press(pilot, "ctrl+g", "ctrl+s")
-        assert isinstance(app.focused, Field)
+        assert isinstance(app.focused, InputField)
         app.focused.value = name
         await press(pilot, "enter")
         await app.workers.wait_for_complete()
@@ -418,5 +420,5 @@ async def test_without_the_feature_of_files_nothing_is_asked_for(monkeypatch: py
     async with on_screen() as (pilot, app, session):
         session.emit(*wave("a", session))
         await press(pilot, "ctrl+g", "ctrl+s")
-        assert not isinstance(app.focused, Field)
+        assert not isinstance(app.focused, InputField)
         assert "the feature plot_files is not there" in app.screen.lines("below").plain

@@ -15,7 +15,7 @@ from textual.pilot import Pilot
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.state.backups import Copy, Drafts
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.dialogs import Confirm, SearchDialog
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.texts import OpenText
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
@@ -49,7 +49,7 @@ async def page(folder: Path, *, file: str = "a.mxt", size: tuple[int, int] = (80
         if file:
             app.texts.open(file)
         typed(pilot, "ctrl+e")
-        await until(pilot, lambda: isinstance(app.screen, ProgramPage if file else Search))
+        await until(pilot, lambda: isinstance(app.screen, ProgramPage if file else SearchDialog))
         await settle(pilot)
         yield pilot
 
@@ -57,7 +57,7 @@ async def page(folder: Path, *, file: str = "a.mxt", size: tuple[int, int] = (80
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 0.02)
+    monkeypatch.setattr("multidrop.tui.screens.program.CHECK_DELAY", 0.02)
     (tmp_path / "a.mxt").write_text(TEXT)
     return tmp_path
 
@@ -148,7 +148,7 @@ async def test_a_copy_is_kept_while_a_text_is_not_saved(folder: Path) -> None:
 
 
 async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 1000.0)
+    monkeypatch.setattr("multidrop.tui.screens.program.CHECK_DELAY", 1000.0)
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' last")
         await until(pilot, lambda: shown(pilot).editor.text.endswith("' last"))
@@ -323,7 +323,7 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(folder: Path) -
         session = app.session
         await until(pilot, lambda: session.selected is not None)
         typed(pilot, "ctrl+e")
-        await until(pilot, lambda: isinstance(app.screen, Search))
+        await until(pilot, lambda: isinstance(app.screen, SearchDialog))
         typed(pilot, "long", "enter")
         await until(pilot, lambda: isinstance(app.screen, ProgramPage))
         page = app.screen
@@ -337,7 +337,7 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(folder: Path) -
         typed(pilot, "enter")
         await until(pilot, lambda: len(page.findings.addresses) == 7)
         typed(pilot, "ctrl+r")
-        await until(pilot, lambda: isinstance(app.screen, Search))
+        await until(pilot, lambda: isinstance(app.screen, SearchDialog))
         typed(pilot, "trace g1", "enter")
         await until(pilot, lambda: "▶" in page.editor.render_line(3).text)
         await until(pilot, lambda: "executes" in page.lines("below").plain)

@@ -15,7 +15,7 @@ from multidrop.tui.panels.program import listing_rows, program_rows, program_tit
 from multidrop.tui.panels.table import log_rows, log_title, piece_rows, size_words, traffic_rows
 from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import ProgramFacts, Readout
-from multidrop.tui.screen_model import Piece, ScreenModel
+from multidrop.tui.screen_model import ScreenModel, TrafficPiece
 from tests.support.fake_session import demo_session
 
 LINES = tuple((1 + 5 * number, f"MR {number}") for number in range(30))
@@ -92,22 +92,22 @@ def test_the_place_of_a_program_that_the_drive_reports_is_its_line() -> None:
 
 def test_bytes_are_hex_and_text_where_there_is_room_and_text_alone_where_not() -> None:
     wall = demo_session().wall
-    (row,) = text(piece_rows(Piece(67.25, True, b"aPR P\n", "a"), wall, 80, {}))
+    (row,) = text(piece_rows(TrafficPiece(67.25, True, b"aPR P\n", "a"), wall, 80, {}))
     assert row == " 12:41:07.250 ↑ a   aPR P·         61 50 52 20 50 0A"
-    (row,) = text(piece_rows(Piece(67.25, False, b"7\r\n"), wall, 40, {}))
+    (row,) = text(piece_rows(TrafficPiece(67.25, False, b"7\r\n"), wall, 40, {}))
     assert row.startswith(" 07.250 ↓ ") and row.endswith("7\\r\\n")
 
 
 def test_bytes_stand_beside_the_name_that_a_person_gave_to_the_drive() -> None:
     wall, names = demo_session().wall, {"a": "gantry", "b": "a name of more than twelve cells"}
-    rows = [piece_rows(Piece(67.25, True, b"P\n", each), wall, 80, names)[0] for each in "abc"]
+    rows = [piece_rows(TrafficPiece(67.25, True, b"P\n", each), wall, 80, names)[0] for each in "abc"]
     shown = ["gantry      ", "a name of m…", "c           "]
     assert text(rows) == [f" 12:41:07.250 ↑ {each} P·           50 0A" for each in shown]
 
 
 @pytest.mark.parametrize("width", [40, 80])
 def test_no_byte_of_a_long_piece_is_left_out(width: int) -> None:
-    rows = text(piece_rows(Piece(1.0, False, bytes(range(256))), demo_session().wall, width, {}))
+    rows = text(piece_rows(TrafficPiece(1.0, False, bytes(range(256))), demo_session().wall, width, {}))
     assert max(map(len, rows)) <= width
     shown = " ".join(rows)
     assert all((f"{code:02X}" if width == 80 else f"\\x{code:02x}") in shown for code in (0x01, 0x7F, 0xFF))
@@ -118,7 +118,7 @@ def test_the_panel_of_traffic_leaves_out_polls_and_shows_the_newest() -> None:
     store = shown.model.bus("press").traffic
     for number in range(9):
         store.take(Traffic(number, True, f"{number}\n".encode()))
-    store.pieces.append(Piece(9.0, True, b"poll", "a", True))
+    store.pieces.append(TrafficPiece(9.0, True, b"poll", "a", True))
     assert [row.split()[-1] for row in text(traffic_rows(shown, 40, 3))] == ["6\\n", "7\\n", "8\\n"]
 
 

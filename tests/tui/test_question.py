@@ -11,9 +11,9 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Static
 
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.macro_arguments import value_fields
-from multidrop.tui.screens.dialogs import Form, GoOn
+from multidrop.tui.screens.dialogs import FormDialog, GoOn
 from tests.support.fake_session import FakeSession, demo_session, make_app, on_screen, press, readable, settle
 from tests.support.real_screen import until
 
@@ -24,7 +24,7 @@ WHAT = "a: CP erases every program and every user variable"
 @pytest.fixture(autouse=True)
 def colours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 1e6)  # keys count once a test says so
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 1e6)  # keys count once a test says so
 
 
 @asynccontextmanager
@@ -163,7 +163,7 @@ async def test_a_note_takes_rows_of_its_own_and_gives_them_back() -> None:
 
 # A form
 
-MACRO = Macro("m", (Step(0.0, "MR {turns:int=10,1..100}"), Step(0.0, "{mode:choice(slow|fast)} {turns}")))
+MACRO = Macro("m", (MacroStep(0.0, "MR {turns:int=10,1..100}"), MacroStep(0.0, "{mode:choice(slow|fast)} {turns}")))
 
 
 @asynccontextmanager
@@ -173,7 +173,7 @@ async def filling() -> AsyncIterator[tuple[Pilot[int], Any, asyncio.Future[Mappi
         assert session.front.fill is not None
         answer = asyncio.ensure_future(session.front.fill("macro m", value_fields(MACRO, {})))
         await settle(pilot)
-        assert isinstance(app.screen, Form)
+        assert isinstance(app.screen, FormDialog)
         await pilot.press(*"lost", "enter")  # typed ahead
         readable(pilot)
         yield pilot, session, answer
@@ -204,5 +204,5 @@ async def test_escape_gives_no_values_and_a_stop_closes_the_form() -> None:
         assert await answer is None
     async with filling() as (pilot, session, answer):
         await press(pilot, "ctrl+x")
-        assert session.stops == 1 and not isinstance(pilot.app.screen, Form)
+        assert session.stops == 1 and not isinstance(pilot.app.screen, FormDialog)
         assert await answer is None

@@ -12,7 +12,7 @@ from multidrop.shell.events import By, Entered, OnBus, Printed
 from multidrop.shell.roles import Filter
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.outbox import BURST
-from multidrop.tui.screens.dialogs import LEAST, Confirm
+from multidrop.tui.screens.dialogs import LEAST_SIZE, Confirm
 from multidrop.tui.widgets.search_bar import MOST_COPIED
 from tests.support.fake_session import (
     FakeSession,
@@ -57,7 +57,7 @@ async def test_a_search_narrows_as_it_is_typed_and_steps_through_the_matches() -
 async def test_on_the_smallest_screen_there_is_room_for_the_searched_text() -> None:
     session = demo_session()
     app = make_app(session)
-    async with app.run_test(size=LEAST) as pilot:
+    async with app.run_test(size=LEAST_SIZE) as pilot:
         await begun(pilot, session)
         await press(pilot, "ctrl+f", *"pr")
         assert app.main.query_one("#find").size.width >= 14
@@ -184,7 +184,7 @@ async def test_in_raw_mode_a_line_keeps_its_spaces_and_enter_alone_ends_one() ->
 async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_to_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 1e6)  # keys count once the test says so
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 1e6)  # keys count once the test says so
     session = demo_session()
     session.refuses["BAD"] = "a: 20 unknown"
     async with on_screen(session) as (pilot, app, _):

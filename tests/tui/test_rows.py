@@ -13,12 +13,12 @@ from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus, StateChanged
-from multidrop.shell.stop_report import Found, Tally
+from multidrop.shell.stop_report import DriveFate, FateTally
 from multidrop.tui.panels.drive import drive_rows
 from multidrop.tui.panels.drives import drives_rows, narrow_rows
 from multidrop.tui.panels.table import PANELS, Panel, column_rows
 from multidrop.tui.panels.view import Glance, View, firmware_of
-from multidrop.tui.readout import Readout, State
+from multidrop.tui.readout import Readout, ReadoutState
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.bars import STOP, Footer, banner_row, footer_row
 from multidrop.tui.widgets.lines import Lines, width_of
@@ -27,7 +27,7 @@ from tests.support.fake_session import FakeDrive, demo_session, emit, on_screen,
 from tests.support.panel_rows import plain
 
 KEYS = [("F1", "help"), *((f"F{n}", f"macro-number-{n}") for n in range(2, 13)), ("^Q", "quit")]
-states = st.sampled_from(list(State))
+states = st.sampled_from(list(ReadoutState))
 
 
 def glance(address: str, *points: tuple[float, int, int], **more: bool) -> Glance:
@@ -124,10 +124,10 @@ def test_a_column_takes_exactly_its_room_and_names_what_finds_none(
 STANDING, MOVING, UNKNOWN, UNREACHED = Fate.STANDING, Fate.MOVING, Fate.NOT_KNOWN, Fate.NOT_REACHED
 
 
-def tally(*found: tuple[Fate, str], vain: bool = False) -> Tally:
+def tally(*found: tuple[Fate, str], vain: bool = False) -> FateTally:
     """Facts about drives, by `bus:address`."""
-    each = (Found(fate, name, name.partition(":")[0], "lost" if fate is UNREACHED else "") for fate, name in found)
-    return Tally(datetime(2026, 11, 21, 12, 41, 9), tuple(each), vain)
+    each = (DriveFate(fate, name, name.partition(":")[0], "lost" if fate is UNREACHED else "") for fate, name in found)
+    return FateTally(datetime(2026, 11, 21, 12, 41, 9), tuple(each), vain)
 
 
 NINE = [(STANDING, f"press:{name}") for name in "abcdefghi"]
@@ -206,7 +206,7 @@ def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
 
 
 def test_the_second_axis_alone_makes_a_drive_move() -> None:
-    assert two_axes().state() is State.MOVING
+    assert two_axes().state() is ReadoutState.MOVING
 
 
 def test_a_row_from_elsewhere_acts_on_no_terminal() -> None:

@@ -25,8 +25,8 @@ from multidrop.shell.events import (
     TwinEnded,
 )
 from multidrop.tui.panels.drive import program_words
-from multidrop.tui.readout import Readout, State
-from multidrop.tui.screen_model import MOST, MOST_BYTES, BusFacts, ScreenModel, TrafficStore, bus_old, bus_state
+from multidrop.tui.readout import Readout, ReadoutState
+from multidrop.tui.screen_model import MOST_BYTES, MOST_PIECES, BusFacts, ScreenModel, TrafficStore, bus_old, bus_state
 
 
 def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:
@@ -43,12 +43,12 @@ def readout(model: ScreenModel, address: str = "a") -> Readout:
 
 
 def test_stopped_is_said_only_when_the_velocity_was_read_as_0(model: ScreenModel) -> None:
-    assert readout(model).state() is State.UNKNOWN
+    assert readout(model).state() is ReadoutState.UNKNOWN
     model.take(sample(1.0, 5000))
     model.take(Notified(1.1, "stop: stop sent to every drive", "press"))
-    assert readout(model).state() is State.MOVING
+    assert readout(model).state() is ReadoutState.MOVING
     model.take(sample(1.2, 0))
-    assert readout(model).state() is State.STOPPED
+    assert readout(model).state() is ReadoutState.STOPPED
 
 
 def test_progress_is_shown_until_its_end(model: ScreenModel) -> None:
@@ -63,7 +63,9 @@ def test_an_old_state_stays_with_its_age_until_the_next_is_read(model: ScreenMod
     model.take(sample(1.0, 5000))
     assert readout(model).words(2.9) == "moving"
     assert readout(model).words(4.0) == "moving 3 s ago"
-    assert bus_state(model.bus("press"), ["a"], False) is State.MOVING and bus_old(model.bus("press"), ["a"], 4.0)
+    assert bus_state(model.bus("press"), ["a"], False) is ReadoutState.MOVING and bus_old(
+        model.bus("press"), ["a"], 4.0
+    )
     model.take(sample(4.1, 0))
     assert readout(model).words(4.2) == "stopped"
     assert readout(model).words(14.0) == "at rest 10 s ago"
@@ -76,22 +78,22 @@ def test_a_stop_takes_no_state_away(model: ScreenModel) -> None:
         model.take(sample(1.0, velocity, address=address))
     model.stopped(2.0)
     assert [readout(model, address).words(2.1) for address in "ab"] == ["at rest 1 s ago", "moving 1 s ago"]
-    assert bus_state(model.bus("press"), ["a", "b"], False) is State.MOVING
+    assert bus_state(model.bus("press"), ["a", "b"], False) is ReadoutState.MOVING
 
 
 def test_a_drive_that_does_not_answer_is_silent_and_not_its_last_state(model: ScreenModel) -> None:
     model.take(sample(1.0, 0))
     model.take(OnBus("press", Silent(2.0, "a")))
     model.take(OnBus("press", Silent(3.0, "a")))
-    assert readout(model).state() is State.SILENT
+    assert readout(model).state() is ReadoutState.SILENT
     assert readout(model).words(4.0) == "silent 3 s"
     model.take(sample(4.0, 0))
-    assert readout(model).state() is State.STOPPED
+    assert readout(model).state() is ReadoutState.STOPPED
 
 
 def test_a_drive_in_program_mode_is_said_to_store(model: ScreenModel) -> None:
     model.take(sample(1.0, 0))
-    assert readout(model).state(storing=True) is State.STORING
+    assert readout(model).state(storing=True) is ReadoutState.STORING
 
 
 def test_what_was_read_before_a_line_was_sent_is_old(model: ScreenModel) -> None:
@@ -159,13 +161,13 @@ def test_what_belongs_to_no_bus_goes_to_the_one_that_is_shown(model: ScreenModel
 def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
     facts = BusFacts()
     facts.readout("a").take(Sample(1.0, "a", 0, 0))
-    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.UNKNOWN
     facts.readout("b").take(Sample(1.0, "b", 0, 0))
-    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
     facts.readout("b").take(Sample(1.1, "b", 0, 7))
-    assert bus_state(facts, ["a", "b"], False) is State.MOVING
-    assert bus_state(facts, ["a", "b"], True) is State.LOST
-    assert bus_state(facts, [], False) is State.UNKNOWN
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.MOVING
+    assert bus_state(facts, ["a", "b"], True) is ReadoutState.LOST
+    assert bus_state(facts, [], False) is ReadoutState.UNKNOWN
 
 
 RUNS = Conditions(program="running", runs=True)
@@ -176,26 +178,26 @@ def test_a_line_is_not_idle_while_a_program_runs_in_a_drive_of_it() -> None:
     for address in both:
         facts.readout(address).take(Sample(1.0, address, 5, 0))
     facts.readout("b").condition(1.0, [RUNS])
-    assert bus_state(facts, both, False) is State.DWELL and not bus_old(facts, both, 1.1)
+    assert bus_state(facts, both, False) is ReadoutState.DWELL and not bus_old(facts, both, 1.1)
     assert bus_old(facts, both, 9.0), "the program was read long ago"
     facts.readout("b").take(Sample(9.0, "b", 5, 0))
-    assert bus_state(facts, both, False) is State.DWELL, "a poll of the motion says nothing of the program"
+    assert bus_state(facts, both, False) is ReadoutState.DWELL, "a poll of the motion says nothing of the program"
     facts.readout("b").condition(10.0, [Conditions(disabled="DE=0", runs=True, program="running")])
-    assert bus_state(facts, both, False) is State.DWELL
+    assert bus_state(facts, both, False) is ReadoutState.DWELL
     facts.readout("b").condition(10.0, [Conditions(runs=False)])
-    assert bus_state(facts, both, False) is State.IDLE
+    assert bus_state(facts, both, False) is ReadoutState.IDLE
 
 
 def test_a_line_is_not_idle_after_a_stop_before_each_drive_was_read(model: ScreenModel) -> None:
     for address in "ab":
         model.take(OnBus("press", Sample(1.0, address, 5, 0)))
     facts = model.bus("press")
-    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
     model.stopped(2.0)
     model.take(OnBus("press", Sample(2.1, "a", 5, 0)))
-    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.UNKNOWN
     model.take(OnBus("press", Sample(2.2, "b", 5, 0)))
-    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
 
 
 def test_what_was_read_of_a_program_before_a_stop_is_past_until_the_stop_has_read_it(model: ScreenModel) -> None:
@@ -204,16 +206,16 @@ def test_what_was_read_of_a_program_before_a_stop_is_past_until_the_stop_has_rea
         model.take(OnBus("press", Conditioned(1.0, address, (RUNS,))))
     facts = model.bus("press")
     a, b = facts.readout("a"), facts.readout("b")
-    assert (a.state(), program_words(a, 2.0)) == (State.DWELL, "program running")
+    assert (a.state(), program_words(a, 2.0)) == (ReadoutState.DWELL, "program running")
     model.stopped(2.0)
-    assert (a.state(), program_words(a, 4.0), a.aged(4.0)) == (State.STOPPED, "program ran 3 s ago", True)
-    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
+    assert (a.state(), program_words(a, 4.0), a.aged(4.0)) == (ReadoutState.STOPPED, "program ran 3 s ago", True)
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.UNKNOWN
     stopped = Sample(3.0, "a", 5, 0, program=False)
     assert not model.quiet(OnBus("press", stopped))
     model.take(OnBus("press", stopped))
     model.take(OnBus("press", Sample(3.0, "b", 5, 0, program=True)))
-    assert (a.state(), program_words(a, 4.0)) == (State.STOPPED, "")
-    assert (b.state(), program_words(b, 4.0)) == (State.DWELL, "program running")
+    assert (a.state(), program_words(a, 4.0)) == (ReadoutState.STOPPED, "")
+    assert (b.state(), program_words(b, 4.0)) == (ReadoutState.DWELL, "program running")
     assert model.quiet(OnBus("press", stopped._replace(at=4.0, program=None)))
     assert not model.quiet(OnBus("press", stopped._replace(at=4.0, program=True)))
     assert not model.quiet(OnBus("press", Conditioned(4.0, "b", (RUNS,)))), "the lamps are current again"
@@ -223,13 +225,13 @@ def test_a_line_with_an_error_shows_it_unless_a_drive_moves_or_is_silent() -> No
     facts = BusFacts()
     for address in ("a", "b"):
         facts.readout(address).take(Sample(1.0, address, 5, 0))
-    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
     facts.readout("b").condition(1.0, [Conditions(error=84)])
-    assert bus_state(facts, ["a", "b"], False) is State.TROUBLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.TROUBLE
     facts.readout("a").take(Sample(2.0, "a", 9, 100))
-    assert bus_state(facts, ["a", "b"], False) is State.MOVING
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.MOVING
     facts.readout("a").no_answer(3.0)
-    assert bus_state(facts, ["a", "b"], False) is State.SILENT
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.SILENT
 
 
 def test_only_what_shows_something_new_is_a_reason_to_paint(model: ScreenModel) -> None:
@@ -326,9 +328,9 @@ def test_single_bytes_of_a_slow_line_are_one_piece_up_to_its_end() -> None:
 
 def test_what_is_kept_is_bounded_in_pieces_and_in_bytes() -> None:
     store = TrafficStore()
-    for _ in range(MOST + 10):
+    for _ in range(MOST_PIECES + 10):
         store.take(Traffic(1.0, True, b"x"))
-    assert len(store.pieces) == MOST and store.taken == MOST + 10
+    assert len(store.pieces) == MOST_PIECES and store.taken == MOST_PIECES + 10
     for _ in range(40):
         store.take(Traffic(1.0, False, b"y" * (MOST_BYTES // 8)))
     store.take(Traffic(1.0, False, b"z" * (2 * MOST_BYTES)))

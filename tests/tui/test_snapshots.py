@@ -19,8 +19,8 @@ from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, Pr
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import Filter, Series
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.curves.samples import Quantity
-from multidrop.tui.curves.trigger import Setting
+from multidrop.tui.curves.samples import TraceQuantity
+from multidrop.tui.curves.trigger import TriggerSetting
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import (
@@ -307,7 +307,7 @@ def test_a_trigger_that_holds_the_picture(snap_compare: Compare, size: str, sign
     async def act(pilot: Pilot[int], session: FakeSession) -> None:
         await plotted(lambda _: None, "ctrl+g", signs=signs)(pilot, session)
         model = pilot.app.model  # type: ignore[attr-defined]
-        setting = Setting(Quantity("press", "a", "", "velocity"), 300_000, True, 0.25)
+        setting = TriggerSetting(TraceQuantity("press", "a", "", "velocity"), 300_000, True, 0.25)
         model.look.arm(setting, True, model.traces)
         several(session)
         session.time += 20
@@ -382,7 +382,7 @@ ROWS = tuple((1 + 6 * number, line) for number, line in enumerate(LINES))
 def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder with a program, and with one that has errors."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 0.02)
+    monkeypatch.setattr("multidrop.tui.screens.program.CHECK_DELAY", 0.02)
     (tmp_path / "shuttle.mxt").write_text(TEXT)
     (tmp_path / "wrong.mxt").write_text(TEXT.replace("MA 0", "MAX 0").replace("PR", "PRINT"))
 

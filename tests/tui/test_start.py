@@ -10,7 +10,7 @@ from multidrop.shell.state import opened as store
 from multidrop.transports import Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import StartEntry
-from multidrop.tui.screens.dialogs import Options
+from multidrop.tui.screens.dialogs import ChoiceList
 from multidrop.tui.screens.start import Start
 from multidrop.tui.text import ago
 from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, painted, press, settle
@@ -37,7 +37,7 @@ def made(*openable: str) -> tuple[MultidropApp, FakeSession]:
 
 
 def listed(app: MultidropApp) -> list[str]:
-    options = app.screen.query_one(Options)
+    options = app.screen.query_one(ChoiceList)
     return [str(options.get_option_at_index(n).prompt).strip() for n in range(options.option_count)]
 
 

@@ -17,9 +17,9 @@ from multidrop.tui.app import MultidropApp, is_stop
 from multidrop.tui.panels.drive import program_words
 from multidrop.tui.panels.view import glances_of
 from multidrop.tui.polling import LIVELY, STATUS
-from multidrop.tui.readout import State
+from multidrop.tui.readout import ReadoutState
 from multidrop.tui.screen_model import ScreenModel, bus_state
-from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Search, TooSmall
+from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, SearchDialog, TooSmall
 from multidrop.tui.screens.start import Start
 from multidrop.tui.terminal.keystream import STOP
 from tests.support.cell_session import CellSession, bus, party
@@ -41,11 +41,11 @@ SCREENS = {
     "main": ((), None),
     "typing with its list open": (tuple("M"), None),
     "typing with text selected": (("M", "R", "shift+home"), None),
-    "help": (("f1",), Search),
+    "help": (("f1",), SearchDialog),
     "drive selector": (("ctrl+o",), Choose),
-    "palette": (("ctrl+p",), Search),
-    "palette being searched": (("ctrl+p", "s", "t"), Search),
-    "history being searched": (("ctrl+r", "M"), Search),
+    "palette": (("ctrl+p",), SearchDialog),
+    "palette being searched": (("ctrl+p", "s", "t"), SearchDialog),
+    "history being searched": (("ctrl+r", "M"), SearchDialog),
     "name of a recording": (("ctrl+p", *"record a", "enter", "x"), Ask),
     "themes": (("ctrl+p", *"theme", "enter"), Choose),
 }
@@ -80,7 +80,7 @@ async def stopped_from(pilot: Pilot[int], app: MultidropApp, name: str) -> None:
 
 @pytest.mark.tui
 async def test_it_stops_under_the_questions_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 0.0)
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.DEAF_TIME", 0.0)
     session = demo_session()
     session.busy = True
     async with on_screen(session) as (pilot, app, _):
@@ -175,7 +175,11 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
                 assert found.fate is not Fate.RUNNING or "program running" in row
             runs = any(each.fate is Fate.RUNNING for each in tally.found)
             state = bus_state(model.bus("press"), list(names), False)
-            assert state in (State.MOVING, State.DWELL) if runs else state is not State.IDLE or tally.stand
+            assert (
+                state in (ReadoutState.MOVING, ReadoutState.DWELL)
+                if runs
+                else state is not ReadoutState.IDLE or tally.stand
+            )
 
         session.subscribe(agree)
         await asyncio.sleep(5.0)
@@ -184,7 +188,7 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
         session.stop()
         model.stopped(session.now())
         await asyncio.sleep(5.0)
-        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is State.IDLE
+        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is ReadoutState.IDLE
         for each in polls:
             each.close()
 

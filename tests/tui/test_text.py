@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from multidrop.tui.text import LONGEST, age, at_words, digits, fit, short, shorter, visible
+from multidrop.tui.text import LONGEST_SHOWN_TEXT, age, at_words, digits, fit, short, shorter, visible
 
 
 def test_control_characters_are_written_out() -> None:
@@ -33,7 +33,7 @@ def test_no_row_of_prose_is_too_wide_and_no_word_is_lost(text: str, width: int) 
 def test_endless_garbage_is_cut_and_says_how_long_it_was() -> None:
     shown = visible("x" * 100_000)
     assert shown.endswith("(100000 characters)")
-    assert len(shown) < LONGEST + 40
+    assert len(shown) < LONGEST_SHOWN_TEXT + 40
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,15 @@ import re
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.tui.readout import State
+from multidrop.tui.readout import ReadoutState
 from multidrop.tui.widgets.bars import TROUBLE, Tab, rule_row, tab_at, top_row
 from multidrop.tui.widgets.lines import width_of
 from tests.support.panel_rows import plain
 
-states = st.sampled_from(list(State))
+states = st.sampled_from(list(ReadoutState))
 
 
-def tabs_of(states: list[State], chosen: int, name: str = "line") -> list[Tab]:
+def tabs_of(states: list[ReadoutState], chosen: int, name: str = "line") -> list[Tab]:
     return [Tab(n + 1, f"{name}{n + 1}", state, n == chosen) for n, state in enumerate(states)]
 
 
@@ -23,7 +23,7 @@ def shown(tabs: list[Tab], width: int) -> str:
 
 @given(st.lists(states, min_size=1, max_size=40), st.integers(60, 200), st.booleans(), st.data())
 def test_the_top_line_fits_and_shows_the_selected_tab_and_all_trouble(
-    found: list[State], width: int, log: bool, data: st.DataObject
+    found: list[ReadoutState], width: int, log: bool, data: st.DataObject
 ) -> None:
     tabs = tabs_of(found, data.draw(st.integers(0, len(found) - 1)))
     row = top_row(tabs, "shuttle", "12:41:07", width, log)
@@ -40,57 +40,57 @@ def test_the_top_line_fits_and_shows_the_selected_tab_and_all_trouble(
 
 def test_tabs_do_not_jump_when_a_state_changes() -> None:
     places = set()
-    for state in (State.MOVING, State.IDLE, State.LOST, State.SILENT, State.UNKNOWN):
-        tabs = [Tab(1, "press", state, True), Tab(2, "eth", State.IDLE, False)]
+    for state in (ReadoutState.MOVING, ReadoutState.IDLE, ReadoutState.LOST, ReadoutState.SILENT, ReadoutState.UNKNOWN):
+        tabs = [Tab(1, "press", state, True), Tab(2, "eth", ReadoutState.IDLE, False)]
         places.add(plain(top_row(tabs, "", "12:41:07", 80)).index("2 eth"))
     assert len(places) == 1
 
 
 def test_eight_tabs_at_80_columns_keep_as_much_of_their_names_as_there_is_room_for() -> None:
     names = ["press", "gantry", "127.0.0.1-5031", "127.0.0.1-5032", "eth", "pmx", "conveyor", "lift"]
-    tabs = [Tab(number, name, State.IDLE, number == 1) for number, name in enumerate(names, 1)]
+    tabs = [Tab(number, name, ReadoutState.IDLE, number == 1) for number, name in enumerate(names, 1)]
     assert shown(tabs, 80) == " 1 press ■  2 gant…■ 3 …5031■ 4 …5032■ 5 eth■ 6 pmx■ 7 conv…■ 8 lift■"
     assert "2 gantry■ 3 …7.0.0.1-5031■ 4 …7.0.0.1-5032■ 5 eth■" in shown(tabs, 100)
     assert "2 gantry ■  3 …7.0.0.1-5031 ■  4 …7.0.0.1-5032 ■  5 eth ■" in shown(tabs, 120)
 
 
 def test_thirty_two_tabs_fold_at_80_columns() -> None:
-    quiet = [State.IDLE] * 32
+    quiet = [ReadoutState.IDLE] * 32
     assert shown(tabs_of(quiet, 0), 80) == "  1 line1 ■  2-32 ■".replace("  1", " 1", 1)
-    quiet[1], quiet[20], quiet[30] = State.MOVING, State.LOST, State.SILENT
+    quiet[1], quiet[20], quiet[30] = ReadoutState.MOVING, ReadoutState.LOST, ReadoutState.SILENT
     assert shown(tabs_of(quiet, 2), 80) == " 1■ 2▶ 3 line3 ■  4-20 ■ 21✗ 22-30 ■ 31? 32■"
 
 
 def test_runs_of_different_states_fold_where_nothing_else_fits_and_what_moves_is_seen() -> None:
-    mixed = [State.IDLE, State.UNKNOWN] * 16
-    mixed[10] = State.MOVING
+    mixed = [ReadoutState.IDLE, ReadoutState.UNKNOWN] * 16
+    mixed[10] = ReadoutState.MOVING
     assert shown(tabs_of(mixed, 0), 80) == " 1 line1 ■  2-32 ▶"
 
 
 def test_more_trouble_than_fits_is_counted() -> None:
-    text = shown(tabs_of([State.LOST] * 32, 5), 60)
+    text = shown(tabs_of([ReadoutState.LOST] * 32, 5), 60)
     assert " 6 line6 ✗" in text and int(text.rpartition("✗")[2]) + text.count("✗") - 1 == 32
 
 
 def test_trouble_besides_the_state_is_marked_and_keeps_its_tab() -> None:
-    tabs = tabs_of([State.IDLE] * 32, 0)
-    tabs[9] = Tab(10, "line10", State.MOVING, False, mark="?")
+    tabs = tabs_of([ReadoutState.IDLE] * 32, 0)
+    tabs[9] = Tab(10, "line10", ReadoutState.MOVING, False, mark="?")
     assert shown(tabs, 80) == " 1 line1 ■  2-9 ■ 10▶? 11-32 ■"
-    whole = [Tab(1, "press", State.MOVING, True, mark=mark) for mark in ("", "!")]
+    whole = [Tab(1, "press", ReadoutState.MOVING, True, mark=mark) for mark in ("", "!")]
     assert [plain(top_row([tab], "", "12:41:07", 80)).index("12:41") for tab in whole] == [71, 71]
     assert "▶ moving!" in plain(top_row(whole[1:], "", "12:41:07", 80))
 
 
 def test_names_give_way_after_words() -> None:
-    tabs = tabs_of([State.IDLE] * 5, 1, "gantry")
+    tabs = tabs_of([ReadoutState.IDLE] * 5, 1, "gantry")
     assert "■ idle" in shown(tabs[:3], 80) and shown(tabs[:3], 80).count("idle") == 3
     assert shown(tabs, 82) == " 1 gantry1 ■  2 gantry2 ■ idle    3 gantry3 ■  4 gantry4 ■  5 gantry5 ■"
     assert shown(tabs, 80) == " 1 gantry1 ■  2 gantry2 ■  3 gantry3 ■  4 gantry4 ■  5 gantry5 ■"
 
 
 def test_a_click_finds_the_tab_and_nothing_beside_the_tabs() -> None:
-    states = [State.IDLE] * 32
-    states[20] = State.LOST
+    states = [ReadoutState.IDLE] * 32
+    states[20] = ReadoutState.LOST
     row = top_row(tabs_of(states, 2), "go", "12:41:07", 80)
     text = plain(row)
     assert tab_at(row, text.index("3 line3")) == 3

@@ -7,8 +7,8 @@ import pytest
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
-from multidrop.shell.raw import Form
-from multidrop.tui.screen_model import KEPT, Record
+from multidrop.shell.raw import ByteForm
+from multidrop.tui.screen_model import MOST_FRESH_RECORDS, Record
 from multidrop.tui.widgets.transcript import Clocks, Transcript, rows_of
 
 pytestmark = pytest.mark.tui
@@ -103,10 +103,10 @@ async def test_the_oldest_line_can_be_reached_and_not_passed() -> None:
 async def test_the_oldest_are_dropped_and_a_reader_moves_on_with_them() -> None:
     app = Reader()
     async with app.run_test(size=(40, 6)) as pilot:
-        app.page.extend(numbered(range(KEPT)))
+        app.page.extend(numbered(range(MOST_FRESH_RECORDS)))
         app.page.look_end(newest=False)
-        app.page.extend(numbered(range(KEPT, KEPT + 1000)))
-        assert len(app.page.records) == KEPT
+        app.page.extend(numbered(range(MOST_FRESH_RECORDS, MOST_FRESH_RECORDS + 1000)))
+        assert len(app.page.records) == MOST_FRESH_RECORDS
         await pilot.resize_terminal(80, 6)
         assert (await shown(pilot, app.page))[-1].startswith(" 1000 older lines were dropped")
         assert (await shown(pilot, app.page))[0].endswith("line 1000")
@@ -180,8 +180,8 @@ async def test_a_hundred_thousand_lines_are_taken_in_within_a_second() -> None:
 
 async def test_raw_bytes_stand_in_columns_with_milliseconds_and_the_gutter_is_as_wide_as_a_name() -> None:
     clocks = Clocks("clock", lambda at: "12:41:05.100")
-    sent = [Record(0.0, "", "↑", row, columns=True) for row in Form.BOTH.rows(b"PR P\r")]
-    got = [Record(0.0, "", "↓", row, columns=True) for row in Form.BOTH.rows(bytes(range(12)) + b"abc")]
+    sent = [Record(0.0, "", "↑", row, columns=True) for row in ByteForm.BOTH.rows(b"PR P\r")]
+    got = [Record(0.0, "", "↓", row, columns=True) for row in ByteForm.BOTH.rows(bytes(range(12)) + b"abc")]
     rows = ["".join(text for text, _ in row) for each in sent + got for row in rows_of(each, None, clocks, 80)]
     assert rows == [
         " 12:41:05.100  ↑ PR P\\r                   50 52 20 50 0D",

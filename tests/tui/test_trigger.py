@@ -6,20 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.tui.curves.samples import Quantity
-from multidrop.tui.curves.trigger import Setting, State, Trigger
+from multidrop.tui.curves.samples import TraceQuantity
+from multidrop.tui.curves.trigger import Trigger, TriggerSetting, TriggerState
 
-HERE = Quantity("press", "a", "", "velocity")
+HERE = TraceQuantity("press", "a", "", "velocity")
 SPAN = 10.0
 
 
-def state(trigger: Trigger) -> State:
+def state(trigger: Trigger) -> TriggerState:
     return trigger.state
 
 
 def armed(level: float = 100, rising: bool = True, before: float = 0.2, single: bool = False) -> Trigger:
     trigger = Trigger()
-    trigger.arm(Setting(HERE, level, rising, before), single)
+    trigger.arm(TriggerSetting(HERE, level, rising, before), single)
     return trigger
 
 
@@ -27,25 +27,25 @@ def test_an_edge_is_a_crossing_of_the_level_in_its_direction_and_its_time_is_bet
     for rising, first, last in ((True, 0, 200), (False, 200, 0)):
         trigger = armed(rising=rising)
         trigger.take([(1.0, last), (1.1, first)], SPAN, 1.1)
-        assert state(trigger) is State.ARMED, "the other edge"
+        assert state(trigger) is TriggerState.ARMED, "the other edge"
         trigger.take([(1.2, last)], SPAN, 1.2)
-        assert state(trigger) is State.TRIGGERED and trigger.at == pytest.approx(1.15)
+        assert state(trigger) is TriggerState.TRIGGERED and trigger.at == pytest.approx(1.15)
         assert trigger.end(SPAN) == pytest.approx(9.15)
 
 
 def test_a_value_that_stays_beyond_the_level_and_one_before_it_was_armed_are_no_edge() -> None:
     trigger = armed()
     trigger.take([(n / 10, 150.0) for n in range(40)], SPAN, 4.0)
-    assert state(trigger) is State.ARMED
+    assert state(trigger) is TriggerState.ARMED
 
 
 def test_it_holds_once_the_picture_is_past_also_if_no_sample_comes() -> None:
     trigger = armed()
     trigger.take([(1.0, 0), (1.1, 100)], SPAN, 1.1)
     trigger.take([], SPAN, trigger.end(SPAN) - 0.01)
-    assert state(trigger) is State.TRIGGERED
+    assert state(trigger) is TriggerState.TRIGGERED
     trigger.take([], SPAN, trigger.end(SPAN))
-    assert state(trigger) is State.HELD
+    assert state(trigger) is TriggerState.HELD
 
 
 def test_a_single_shot_stands_and_the_others_take_the_next_edge_after_the_picture() -> None:
@@ -53,27 +53,27 @@ def test_a_single_shot_stands_and_the_others_take_the_next_edge_after_the_pictur
     single, again = armed(single=True), armed()
     for trigger in (single, again):
         trigger.take(wave, SPAN, 30.0)
-    assert state(single) is State.HELD and single.at == pytest.approx(1.45)
+    assert state(single) is TriggerState.HELD and single.at == pytest.approx(1.45)
     assert again.at == pytest.approx(28.45), "each time the first edge after the picture"
     single.arm(single.setting, True)  # type: ignore[arg-type]
-    assert state(single) is State.ARMED
+    assert state(single) is TriggerState.ARMED
 
 
 def test_nothing_is_joined_over_a_gap_but_slow_samples_are() -> None:
     trigger = armed()
     trigger.take([(1.0, 0), (1.1, 0), (9.0, 200)], SPAN, 9.0)
-    assert state(trigger) is State.ARMED
+    assert state(trigger) is TriggerState.ARMED
     slow = armed()
     slow.take([(0.0, 0), (2.0, 0), (4.0, 200)], SPAN, 4.0)
-    assert state(slow) is State.TRIGGERED
+    assert state(slow) is TriggerState.TRIGGERED
 
 
 ALLOWED = {
     "take": {
-        (State.ARMED, State.TRIGGERED),
-        (State.ARMED, State.HELD),
-        (State.TRIGGERED, State.HELD),
-        (State.HELD, State.TRIGGERED),
+        (TriggerState.ARMED, TriggerState.TRIGGERED),
+        (TriggerState.ARMED, TriggerState.HELD),
+        (TriggerState.TRIGGERED, TriggerState.HELD),
+        (TriggerState.HELD, TriggerState.TRIGGERED),
     }
 }
 STEP = st.one_of(
@@ -90,10 +90,10 @@ def test_states_follow_each_other_as_the_table_says(steps: list[object], before:
         was, at = trigger.state, trigger.at
         if step == "disarm":
             trigger.disarm()
-            assert trigger.state is State.OFF and not trigger.stands
+            assert trigger.state is TriggerState.OFF and not trigger.stands
         elif isinstance(step, bool):
-            trigger.arm(Setting(HERE, 50, True, before), step)
-            assert trigger.state is State.ARMED
+            trigger.arm(TriggerSetting(HERE, 50, True, before), step)
+            assert trigger.state is TriggerState.ARMED
         elif isinstance(step, list):
             samples = []
             for wait, value in step:
@@ -101,9 +101,9 @@ def test_states_follow_each_other_as_the_table_says(steps: list[object], before:
                 samples.append((now, value))
             trigger.take(samples, SPAN, now)
             assert trigger.state is was or (was, trigger.state) in ALLOWED["take"]
-            if was is State.HELD and trigger.single:
+            if was is TriggerState.HELD and trigger.single:
                 assert (trigger.state, trigger.at) == (was, at), "a single shot stands"
-            if trigger.state is State.HELD:
+            if trigger.state is TriggerState.HELD:
                 assert now >= trigger.end(SPAN)
             if trigger.at != at:
                 assert trigger.at <= now

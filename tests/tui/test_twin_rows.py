@@ -17,7 +17,7 @@ from multidrop.tui.panels.drives import drives_rows, kept, narrow_rows
 from multidrop.tui.panels.plot import plot_rows, plot_title
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import trouble_mark
-from multidrop.tui.readout import State
+from multidrop.tui.readout import ReadoutState
 from multidrop.tui.screen_model import bus_state
 from multidrop.tui.screens.all_drives import drive_row, summary, worst_first
 from multidrop.tui.widgets.lines import Row, width_of
@@ -133,12 +133,12 @@ def test_trouble_and_a_difference_are_both_said(session: FakeSession) -> None:
 
 def test_a_tab_counts_a_drive_that_differs_as_trouble(session: FakeSession) -> None:
     facts = view(session, *beside(session.time, 0, 0, 8112), isolated(session)).model.bus("press")
-    assert bus_state(facts, ["a"], False) is State.DIFFERS and trouble_mark(facts, ["a"], False) == ""
+    assert bus_state(facts, ["a"], False) is ReadoutState.DIFFERS and trouble_mark(facts, ["a"], False) == ""
     facts = view(session, *beside(session.time, 0, 9, 8112), isolated(session)).model.bus("press")
-    assert bus_state(facts, ["a"], False) is State.MOVING and trouble_mark(facts, ["a"], False) == "≠"
-    assert bus_state(facts, ["a"], True) is State.LOST and trouble_mark(facts, ["a"], True) == ""
+    assert bus_state(facts, ["a"], False) is ReadoutState.MOVING and trouble_mark(facts, ["a"], False) == "≠"
+    assert bus_state(facts, ["a"], True) is ReadoutState.LOST and trouble_mark(facts, ["a"], True) == ""
     tab = make_app(session).presenter.tabs(session.time)[0]
-    assert not tab.in_trouble and tab.__class__(1, "press", State.DIFFERS, False).in_trouble
+    assert not tab.in_trouble and tab.__class__(1, "press", ReadoutState.DIFFERS, False).in_trouble
 
 
 # Plots

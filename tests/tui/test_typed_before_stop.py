@@ -13,7 +13,7 @@ from multidrop.drives.events import Traffic
 from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.shell.events import Entered, OnBus, SessionEvent
 from multidrop.shell.session import Session
-from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.dialogs import Confirm, SearchDialog
 from multidrop.tui.screens.start import Start
 from tests.support.fake_session import FakeSession, demo_session
 from tests.support.pty_screen import PtyScreen, demo, on_a_pty
@@ -240,7 +240,7 @@ async def test_two_stops_before_the_line_is_emptied_tell_of_all_that_was_dropped
 async def test_the_search_is_closed_and_its_line_is_not_taken() -> None:
     async with demo() as (screen, session, _):
         await screen.type(b"\x12MR 5")
-        assert isinstance(screen.app.screen, Search)
+        assert isinstance(screen.app.screen, SearchDialog)
         await screen.type(STOP + b"\r")
         assert screen.app.main.entry.value == ""
         assert session.sent == []

@@ -13,7 +13,7 @@ from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.shell.events import Diverged, OnBus, Predicted, SettingsRead
 from multidrop.shell.roles import Series
-from multidrop.shell.units import Axis
+from multidrop.shell.units import ScaledAxis
 from multidrop.tui.figures import NATIVE, figures_of
 from multidrop.tui.panels.drive import drive_rows
 from multidrop.tui.panels.drives import narrow_rows
@@ -41,8 +41,8 @@ def scaled(given: str | dict[str, str] = FIVE, *, sure: bool = True) -> FakeSess
     return session
 
 
-def axis_of(text: str, turn: int = 51200) -> Axis:
-    found = Axis(scale(text))
+def axis_of(text: str, turn: int = 51200) -> ScaledAxis:
+    found = ScaledAxis(scale(text))
     found.accept(Basis((), Fraction(turn)))
     return found
 
@@ -170,12 +170,12 @@ def test_a_shown_place_typed_back_is_the_same_count(text: str, turn: int, counts
 
 
 def test_velocities_in_units_of_a_chip_that_no_setting_tells_stay_as_they_are() -> None:
-    axis = Axis(scale(FIVE))
+    axis = ScaledAxis(scale(FIVE))
     axis.accept(Basis((), Fraction(51200), None, None))
     assert isinstance(axis.measure, Measure)
     figures = figures_of(axis, referenced=True)
     assert (figures.place(51200), figures.speed(105)) == ("5.00000 mm", "105")
-    assert figures_of(Axis(scale(FIVE)), referenced=True) is NATIVE
+    assert figures_of(ScaledAxis(scale(FIVE)), referenced=True) is NATIVE
 
 
 async def test_the_palette_shows_the_drives_own_numbers_and_units_again() -> None:

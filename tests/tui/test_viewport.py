@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from multidrop.shell.roles import EVERYTHING, Filter
 from multidrop.tui.screen_model import Record
-from multidrop.tui.widgets.viewport import Index, Picked, Records, Search, Shown, Sight
+from multidrop.tui.widgets.viewport import Index, Picked, RecordFilter, Records, RecordSearch, VisibleRecords
 from tests.support.cases import for_each
 
 TALK = [
@@ -47,26 +47,26 @@ def numbered(count: int) -> list[Record]:
     ],
 )
 def test_a_filter_keeps_what_was_asked_with_its_answers_and_warnings(wanted: Filter, shown: Iterable[int]) -> None:
-    sight = Sight(taken(TALK))
+    sight = VisibleRecords(taken(TALK))
     sight.choose(wanted)
     assert list(sight.numbers) == list(shown)
 
 
 def test_the_line_of_a_failure_is_shown_though_others_came_between() -> None:
     records = taken([Record(1, "a", ">", "BAD"), Record(2, "b", ">", "PR P"), Record(3, "b", "x", "b: no")])
-    index = Index(records, Shown(Filter(errors=True)))
+    index = Index(records, RecordFilter(Filter(errors=True)))
     assert list(index.numbers) == [1, 2]
     records.take([Record(4, "a", "x", "a: 20 unknown")])
     assert list(index.numbers) == [0, 1, 2, 3]
 
 
 def test_what_is_typed_under_a_filter_is_shown_with_its_replies() -> None:
-    sight = Sight(taken(TALK))
+    sight = VisibleRecords(taken(TALK))
     sight.choose(Filter(address="b", errors=True), typed=True)
     before = list(sight.numbers)
     sight.records.take([Record(2, "a", ">", "PR P"), Record(2, "a", "", "0"), Record(2, "a", "»", "PR V", mine=False)])
     assert list(sight.numbers) == [*before, 10, 11]
-    search = Search(sight)
+    search = RecordSearch(sight)
     search.find("PR")
     assert search.place == (2, 2)
 
@@ -89,7 +89,7 @@ def test_text_is_bounded_and_the_newest_record_stays_however_long_it_is() -> Non
 def test_an_index_that_grows_is_the_index_of_all(lines: list[tuple[str, bool, str]], most: int, wanted: Filter) -> None:
     made = [Record(0, "a", mark.strip(), text, mine=mine) for mark, mine, text in lines]
     records, whole = Records(most=most), Records()
-    index, all_of_it = Index(records, Shown(wanted)), Index(whole, Shown(wanted))
+    index, all_of_it = Index(records, RecordFilter(wanted)), Index(whole, RecordFilter(wanted))
     for record in made:
         records.take([record])
         assert all(records.first <= number < records.taken for number in index.numbers)
@@ -99,7 +99,7 @@ def test_an_index_that_grows_is_the_index_of_all(lines: list[tuple[str, bool, st
 
 
 def test_a_paused_view_stays_until_it_is_let_go_on() -> None:
-    sight = Sight(taken(numbered(100)))
+    sight = VisibleRecords(taken(numbered(100)))
     sight.height = 10
     sight.pause()
     sight.records.take(numbered(50))
@@ -112,9 +112,9 @@ def test_a_paused_view_stays_until_it_is_let_go_on() -> None:
 
 
 def test_a_search_begins_at_the_bottom_and_goes_up() -> None:
-    sight = Sight(taken(numbered(100)))
+    sight = VisibleRecords(taken(numbered(100)))
     sight.height = 10
-    search = Search(sight)
+    search = RecordSearch(sight)
     search.find("line 4")
     assert (search.at, search.place) == (49, (11, 11))
     search.step(-1)
@@ -129,17 +129,17 @@ def test_a_search_begins_at_the_bottom_and_goes_up() -> None:
 
 
 def test_a_search_that_finds_nothing_leaves_the_view_following() -> None:
-    sight = Sight(taken(numbered(20)))
-    search = Search(sight)
+    sight = VisibleRecords(taken(numbered(20)))
+    search = RecordSearch(sight)
     search.find("z")
     search.end()
     assert sight.following
 
 
 def test_a_search_counts_what_arrives_and_only_what_is_shown() -> None:
-    sight = Sight(taken(TALK))
+    sight = VisibleRecords(taken(TALK))
     sight.choose(Filter(mine=True))
-    search = Search(sight)
+    search = RecordSearch(sight)
     search.find("pr")
     assert search.place == (1, 1)
     sight.records.take([Record(2, "a", ">", "PR P"), Record(2, "a", "»", "PR V", mine=False)])
@@ -147,7 +147,7 @@ def test_a_search_counts_what_arrives_and_only_what_is_shown() -> None:
 
 
 def test_lines_are_picked_upwards_from_the_newest_one() -> None:
-    sight = Sight(taken(numbered(20)))
+    sight = VisibleRecords(taken(numbered(20)))
     sight.height = 5
     picked = Picked(sight)
     picked.move(-1, extend=True)
@@ -162,7 +162,7 @@ def test_lines_are_picked_upwards_from_the_newest_one() -> None:
 
 
 def test_nothing_is_picked_of_an_empty_transcript() -> None:
-    sight = Sight(Records())
+    sight = VisibleRecords(Records())
     picked = Picked(sight)
     picked.move(-1, extend=True)
     assert picked.records == []

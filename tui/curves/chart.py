@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from math import floor
 from typing import NamedTuple
 
-from multidrop.tui.curves.raster import BRAILLE, Curve, Frame, Ink, Raster, Run, Scale, magnified, steady
-from multidrop.tui.curves.samples import Columns, Quantity, Traces
-from multidrop.tui.curves.trigger import Setting, State, Trigger
+from multidrop.tui.curves.raster import BRAILLE, Curve, Ink, PlotFrame, Raster, Run, TickScale, magnified, steady
+from multidrop.tui.curves.samples import Columns, TraceQuantity, Traces
+from multidrop.tui.curves.trigger import Trigger, TriggerSetting, TriggerState
 
 
-class Window(NamedTuple):
+class ColumnWindow(NamedTuple):
     """The columns of cells that are shown. Both count from time 0."""
 
     span: float
@@ -37,7 +37,7 @@ class Window(NamedTuple):
         return self.cell / self.wide
 
 
-KEPT = 3
+MOST_KEPT_RASTERS = 3
 """Pictures of different heights that are kept."""
 
 
@@ -56,14 +56,16 @@ class Chart:
     """Keeps the columns of its quantities, its scale, and what was drawn."""
 
     def __init__(self) -> None:
-        self._columns: dict[Quantity, Columns] = {}
-        self._scale: Scale | None = None
+        self._columns: dict[TraceQuantity, Columns] = {}
+        self._scale: TickScale | None = None
         self._wide, self._rows = 1, 0
         self._rasters: dict[tuple[int, ...], Raster] = {}
 
-    def take(self, traces: Traces, quantities: Sequence[Quantity], window: Window) -> dict[Quantity, Extent]:
+    def take(
+        self, traces: Traces, quantities: Sequence[TraceQuantity], window: ColumnWindow
+    ) -> dict[TraceQuantity, Extent]:
         """Take in new samples; return the extent of each quantity that has values in the window."""
-        found: dict[Quantity, Extent] = {}
+        extents: dict[TraceQuantity, Extent] = {}
         self._wide = window.wide
         oldest, newest = window.first * window.wide, window.last * window.wide + window.wide - 1
         for quantity in quantities:
@@ -75,13 +77,15 @@ class Chart:
                 columns = self._columns[quantity] = Columns(trace, window.dot, oldest - window.columns)
             columns.update(oldest)
             if extent := columns.extent(oldest, newest):
-                found[quantity] = Extent(*extent)
-        return found
+                extents[quantity] = Extent(*extent)
+        return extents
 
-    def scale(self, extents: Sequence[Extent], least: float, zero: bool, zoom: int, centre: float, rows: int) -> Scale:
+    def scale(
+        self, extents: Sequence[Extent], least: float, zero: bool, zoom: int, centre: float, rows: int
+    ) -> TickScale:
         """The scale of these extents in this number of rows, at least `least` wide; `zero`: with 0 in it."""
-        low = min([each.low for each in extents] + [0.0] * zero)
-        high = max([each.high for each in extents] + [0.0] * zero)
+        low = min([extent.low for extent in extents] + [0.0] * zero)
+        high = max([extent.high for extent in extents] + [0.0] * zero)
         if zero and low == 0:
             high = max(high, least)
         self._scale = steady(self._scale if rows == self._rows else None, low, high, rows, least)
@@ -89,43 +93,48 @@ class Chart:
         return magnified(self._scale, rows, zoom, min(max(centre, low), high))
 
     def draw(
-        self, shown: Sequence[tuple[Quantity, int, Scale]], window: Window, rows: int, scale: Scale, ink: Ink
+        self,
+        shown: Sequence[tuple[TraceQuantity, int, TickScale]],
+        window: ColumnWindow,
+        rows: int,
+        scale: TickScale,
+        ink: Ink,
     ) -> list[list[Run]]:
         """Draw quantities, each with the number of its colour and dashes, and `scale` in its own units."""
         raster = self._rasters.get((rows, window.columns))
         if raster is None:
-            if len(self._rasters) >= KEPT:
+            if len(self._rasters) >= MOST_KEPT_RASTERS:
                 self._rasters.clear()
             raster = self._rasters[rows, window.columns] = Raster()
         curves = [Curve(self._columns[quantity], number, own) for quantity, number, own in shown]
-        return raster.draw(curves, Frame(window.first, window.columns, rows, scale, ink))
+        return raster.draw(curves, PlotFrame(window.first, window.columns, rows, scale, ink))
 
-    def value_at(self, quantity: Quantity, at: float) -> float | None:
+    def value_at(self, quantity: TraceQuantity, at: float) -> float | None:
         """The last value in the column of cells at a time; None where nothing is known."""
         columns = self._columns.get(quantity)
         if columns is None:
             return None
         x = floor(at / columns.dot) // self._wide * self._wide
-        cell = [columns.columns[each] for each in range(x, x + self._wide) if each in columns.columns]
+        cell = [columns.columns[column] for column in range(x, x + self._wide) if column in columns.columns]
         return cell[-1].last if cell else None
 
 
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0)
 """Seconds between two ticks of time."""
-APART = 11
+TICK_COLUMNS = 11
 """Least cells between two ticks of time."""
 SPANS = (2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0)
 """Seconds that a plot shows, or up to a tenth more, so that a tick falls on a cell."""
-USUAL = SPANS.index(20.0)
-LARGEST = 64
+USUAL_SPAN = SPANS.index(20.0)
+LARGEST_ZOOM = 64
 """The greatest zoom of values."""
 
 
-class Look:
+class ChartView:
     """The view that a person has set. Every key is a transition."""
 
     def __init__(self) -> None:
-        self._span = USUAL
+        self._span = USUAL_SPAN
         self.ink: Ink = BRAILLE
         self.paused_at: float | None = None
         """The time at the right edge while paused."""
@@ -149,14 +158,14 @@ class Look:
     def span(self) -> float:
         return SPANS[self._span]
 
-    def window(self, now: float, columns: int, wide: int) -> Window:
+    def window(self, now: float, columns: int, wide: int) -> ColumnWindow:
         end = now if self.paused_at is None else self.paused_at
         step, cell = self.cells(columns)
-        return Window(cell * columns, floor(end / cell) - columns + 1, columns, wide, step)
+        return ColumnWindow(cell * columns, floor(end / cell) - columns + 1, columns, wide, step)
 
     def cells(self, columns: int) -> tuple[float, float]:
         """The seconds between two ticks of time, and those of a cell."""
-        step = next((each for each in STEPS if each * columns >= self.span * APART), self.span)
+        step = next((each for each in STEPS if each * columns >= self.span * TICK_COLUMNS), self.span)
         return step, step / floor(columns * step / self.span + 1e-9)
 
     def pause(self, now: float) -> None:
@@ -169,7 +178,7 @@ class Look:
     def go_on(self) -> None:
         self.paused_at = self.cursor = self.other = None
 
-    def arm(self, setting: Setting, single: bool, traces: Traces) -> None:
+    def arm(self, setting: TriggerSetting, single: bool, traces: Traces) -> None:
         """Let the trigger wait for the next edge; the picture runs until then."""
         trace = traces.get(setting.quantity)
         self._taken = trace.count if trace is not None else 0
@@ -179,7 +188,7 @@ class Look:
     def follow(self, traces: Traces, now: float) -> None:
         """Show the picture of the trigger, with the new samples; it does not change while it has a cursor."""
         trigger, held = self.trigger, self.paused_at is not None and not self.trigger.stands
-        if trigger.state is State.OFF or trigger.setting is None or held or self.cursor is not None:
+        if trigger.state is TriggerState.OFF or trigger.setting is None or held or self.cursor is not None:
             return
         trace = traces.get(trigger.setting.quantity)
         trigger.take(trace.since(self._taken) if trace is not None else (), self.span, now)
@@ -206,10 +215,10 @@ class Look:
 
     def closer(self, by: int) -> None:
         """Magnify the values by a factor of two, `by` times."""
-        self.zoom = min(max(1, self.zoom << by if by > 0 else self.zoom >> -by), LARGEST)
+        self.zoom = min(max(1, self.zoom << by if by > 0 else self.zoom >> -by), LARGEST_ZOOM)
 
     def automatic(self) -> None:
-        self._span, self.zoom = USUAL, 1
+        self._span, self.zoom = USUAL_SPAN, 1
 
     def move_cursor(self, columns: int, now: float, width: int) -> None:
         """Move the cursor by columns of a picture of this width; that pauses, and shifts the picture at its edge."""

@@ -96,7 +96,7 @@ MOST_TICKS = 8
 TENS = (1.0, 10.0, 100.0, 1000.0)
 
 
-class Scale(NamedTuple):
+class TickScale(NamedTuple):
     """The span of an axis. `step` is that of its ticks, 1, 2 or 5 times a power of ten; 0 is one of them."""
 
     low: float
@@ -108,7 +108,7 @@ class Scale(NamedTuple):
         return round((self.high - value) / (self.high - self.low) * (dots - 1))
 
 
-def nice_scale(low: float, high: float, rows: int, least: float = 1.0) -> Scale:
+def nice_scale(low: float, high: float, rows: int, least: float = 1.0) -> TickScale:
     """The narrowest scale around the values, at least `least` wide, whose ticks are the same whole rows apart."""
     if high - low < least:
         middle = (low + high) / 2
@@ -123,11 +123,11 @@ def nice_scale(low: float, high: float, rows: int, least: float = 1.0) -> Scale:
         bottom, top = math.floor(low / unit + 1e-9), math.ceil(high / unit - 1e-9)
         if (spare := rows - 1 - (top - bottom)) >= 0:
             bottom -= min(spare // 2, bottom) if bottom >= 0 else spare // 2 if top > 0 else spare
-            return Scale(bottom * unit, (bottom + rows - 1) * unit, step)
+            return TickScale(bottom * unit, (bottom + rows - 1) * unit, step)
     raise AssertionError
 
 
-def steady(before: Scale | None, low: float, high: float, rows: int, least: float) -> Scale:
+def steady(before: TickScale | None, low: float, high: float, rows: int, least: float) -> TickScale:
     """The scale before while it fits: it grows at once, and shrinks when the values fill less than a third of it."""
     fitting = nice_scale(low, high, rows, least)
     if before is None or low < before.low or high > before.high:
@@ -135,7 +135,7 @@ def steady(before: Scale | None, low: float, high: float, rows: int, least: floa
     return fitting if fitting.high - fitting.low < (before.high - before.low) / 2.5 else before
 
 
-def magnified(scale: Scale, rows: int, factor: int, centre: float) -> Scale:
+def magnified(scale: TickScale, rows: int, factor: int, centre: float) -> TickScale:
     """A part of a scale around a value, `factor` times as large; its ticks are round."""
     if factor <= 1:
         return scale
@@ -143,13 +143,13 @@ def magnified(scale: Scale, rows: int, factor: int, centre: float) -> Scale:
     return nice_scale(centre - half, centre + half, rows, 2 * half)
 
 
-def ticks(scale: Scale, rows: int) -> dict[int, float]:
+def ticks(scale: TickScale, rows: int) -> dict[int, float]:
     """Row (0 is the top) and value of each tick."""
     first, last = math.ceil(scale.low / scale.step - 1e-6), math.floor(scale.high / scale.step + 1e-6)
     return {row_of(n * scale.step, scale, rows): n * scale.step for n in range(first, last + 1)}
 
 
-def row_of(value: float, scale: Scale, rows: int) -> int:
+def row_of(value: float, scale: TickScale, rows: int) -> int:
     """The row of cells that shows a value."""
     return min(rows - 1, max(0, scale.dot(value, rows * 4) // 4))
 
@@ -160,13 +160,13 @@ Run = tuple[str, int]
 """Cells of one owner, side by side."""
 
 
-class Frame(NamedTuple):
+class PlotFrame(NamedTuple):
     """The frame of a picture: a window of columns of cells, its rows, scale and ink."""
 
     first: int
     columns: int
     rows: int
-    scale: Scale
+    scale: TickScale
     ink: Ink
 
     @property
@@ -183,7 +183,7 @@ class Curve(NamedTuple):
 
     columns: Columns
     number: int
-    scale: Scale | None = None
+    scale: TickScale | None = None
     """The scale of its values where it is not that of the frame: they are shown in other units."""
 
 
@@ -201,19 +201,19 @@ class Raster:
         self.drawn = 0
         """Number of columns of cells drawn so far."""
 
-    def draw(self, curves: Sequence[Curve], frame: Frame) -> list[list[Run]]:
+    def draw(self, curves: Sequence[Curve], frame: PlotFrame) -> list[list[Run]]:
         """Draw a window, from top to bottom."""
         valid = (frame.rows, frame.scale, frame.ink, *curves)
         if valid != self._valid:
             self._kept.clear()
             self._valid = valid
         else:
-            now = [each.columns.taken for each in curves]
+            now = [curve.columns.taken for curve in curves]
             changed = [last for taken, (before, last) in zip(now, self._seen, strict=True) if taken != before]
             if changed:
                 first = min(changed) // frame.ink.wide
                 self._kept = {x: column for x, column in self._kept.items() if x < first}
-        self._seen = [(each.columns.taken, each.columns.last) for each in curves]
+        self._seen = [(curve.columns.taken, curve.columns.last) for curve in curves]
         for x in range(frame.first, frame.last + 1):
             if x not in self._kept:
                 self._kept[x] = self._column(curves, frame, x)
@@ -227,7 +227,7 @@ class Raster:
         self._runs = [self._runs[y] if same and row == before[y] else _runs(*row) for y, row in enumerate(self._rows)]
         return self._runs
 
-    def _column(self, curves: Sequence[Curve], frame: Frame, x: int) -> Cells:
+    def _column(self, curves: Sequence[Curve], frame: PlotFrame, x: int) -> Cells:
         """Draw one column of cells; where curves meet, the cell shows the dots of all, and belongs to the first."""
         self.drawn += 1
         ink, rows = frame.ink, frame.rows
@@ -242,11 +242,11 @@ class Raster:
                 for y in ink.dots(number, at, *span):
                     dots[y // ink.tall] |= 1 << (side * ink.tall + y % ink.tall)
                     owners[y // ink.tall] = number
-        signs = (ink.glyph(each, owner) if each else " " for each, owner in zip(dots, owners, strict=True))
+        signs = (ink.glyph(dot, owner) if dot else " " for dot, owner in zip(dots, owners, strict=True))
         return tuple(signs), tuple(owners)
 
 
-def _span(column: Column, scale: Scale, dots: int) -> tuple[int, int] | None:
+def _span(column: Column, scale: TickScale, dots: int) -> tuple[int, int] | None:
     """The dots of a column from top to bottom, with the line that comes from the column before; None: beyond it."""
     top, bottom = sorted((scale.dot(column.high, dots), scale.dot(column.low, dots)))
     if not isnan(column.come):
@@ -261,31 +261,31 @@ def _span(column: Column, scale: Scale, dots: int) -> tuple[int, int] | None:
 
 def _runs(signs: Sequence[str], owners: Sequence[int]) -> list[Run]:
     """Join neighbouring cells; empty ones belong to the run before them, where there is one."""
-    found: list[Run] = []
+    runs: list[Run] = []
     begin = 0
     for owner, group in groupby(owners):
         end = begin + sum(1 for _ in group)
         text = "".join(signs[begin:end])
-        if found and owner == EMPTY:
-            found[-1] = (found[-1][0] + text, found[-1][1])
-        elif found and (found[-1][1] in (owner, EMPTY)):
-            found[-1] = (found[-1][0] + text, owner)
+        if runs and owner == EMPTY:
+            runs[-1] = (runs[-1][0] + text, runs[-1][1])
+        elif runs and (runs[-1][1] in (owner, EMPTY)):
+            runs[-1] = (runs[-1][0] + text, owner)
         else:
-            found.append((text, owner))
+            runs.append((text, owner))
         begin = end
-    return found
+    return runs
 
 
 def with_cursor(runs: Sequence[Run], at: int, sign: str) -> list[Run]:
     """Put the cursor into a row at a column of cells; a curve stays visible in it."""
-    found: list[Run] = []
+    with_mark: list[Run] = []
     begin = 0
     for text, owner in runs:
         here = at - begin
         if 0 <= here < len(text):
             cell = sign if text[here] == " " else text[here]
-            found += [each for each in ((text[:here], owner), (cell, CURSOR), (text[here + 1 :], owner)) if each[0]]
+            with_mark += [run for run in ((text[:here], owner), (cell, CURSOR), (text[here + 1 :], owner)) if run[0]]
         else:
-            found.append((text, owner))
+            with_mark.append((text, owner))
         begin += len(text)
-    return found
+    return with_mark

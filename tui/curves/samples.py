@@ -16,9 +16,9 @@ from multidrop.drives.events import Sample, Valued
 from multidrop.shell.events import Predicted
 from multidrop.shell.roles import DIFFERENCE
 
-KEPT = 660.0
+KEPT_SECONDS = 660.0
 """Seconds of samples that are kept: the longest span, and some more to look back."""
-MOST = 65_536
+MOST_POINTS = 65_536
 """Samples that are kept at most."""
 OVERDUE = 1.5
 """Seconds after which a sample is missed."""
@@ -30,7 +30,7 @@ PREDICTED = {"position": "predicted position", "velocity": "predicted velocity"}
 """The predicted quantity for each measured one."""
 
 
-class Quantity(NamedTuple):
+class TraceQuantity(NamedTuple):
     """The quantity of a trace: `word` is `position`, `velocity`, one of a twin, or a word of the drive's language."""
 
     bus: str
@@ -53,7 +53,7 @@ class Trace:
             at = self.at[-1]
         self.at.append(at)
         self.values.append(value)
-        if len(self.at) > MOST or (len(self.at) % _SLACK == 0 and at - self.at[_SLACK - 1] > KEPT):
+        if len(self.at) > MOST_POINTS or (len(self.at) % _SLACK == 0 and at - self.at[_SLACK - 1] > KEPT_SECONDS):
             del self.at[:_SLACK], self.values[:_SLACK]
             self.dropped += _SLACK
 
@@ -87,45 +87,45 @@ class Traces:
     """The traces of all that is plotted or shown."""
 
     def __init__(self) -> None:
-        self._traces: defaultdict[Quantity, Trace] = defaultdict(Trace)
+        self._traces: defaultdict[TraceQuantity, Trace] = defaultdict(Trace)
 
-    def add(self, quantity: Quantity, at: float, value: float) -> None:
+    def add(self, quantity: TraceQuantity, at: float, value: float) -> None:
         self._traces[quantity].add(at, value)
 
     def take(self, bus: str, event: Sample | Valued) -> None:
         if isinstance(event, Valued):
-            self.add(Quantity(bus, event.address, "", event.word), event.at, event.value)
+            self.add(TraceQuantity(bus, event.address, "", event.word), event.at, event.value)
         else:
-            self.add(Quantity(bus, event.address, event.axis, "position"), event.at, event.position)
-            self.add(Quantity(bus, event.address, event.axis, "velocity"), event.at, event.velocity)
+            self.add(TraceQuantity(bus, event.address, event.axis, "position"), event.at, event.position)
+            self.add(TraceQuantity(bus, event.address, event.axis, "velocity"), event.at, event.velocity)
 
     def predict(self, bus: str, event: Predicted) -> None:
         """Take a prediction of a drive's twin."""
         drive = (bus, event.address, event.axis)
-        self.add(Quantity(*drive, PREDICTED["position"]), event.at, event.position)
-        self.add(Quantity(*drive, PREDICTED["velocity"]), event.at, event.velocity)
-        self.add(Quantity(*drive, DIFFERENCE), event.at, event.difference)
+        self.add(TraceQuantity(*drive, PREDICTED["position"]), event.at, event.position)
+        self.add(TraceQuantity(*drive, PREDICTED["velocity"]), event.at, event.velocity)
+        self.add(TraceQuantity(*drive, DIFFERENCE), event.at, event.difference)
 
-    def get(self, quantity: Quantity) -> Trace | None:
+    def get(self, quantity: TraceQuantity) -> Trace | None:
         """The trace of a quantity; None before its first sample."""
         return self._traces.get(quantity)
 
     def axes(self, bus: str, address: str) -> list[str]:
         """The axes of a drive that were read; empty before the first sample."""
-        return [each.axis for each in self._traces if each[:2] == (bus, address) and each.word == "position"]
+        return [trace.axis for trace in self._traces if trace[:2] == (bus, address) and trace.word == "position"]
 
     def rename(self, before: str, now: str) -> None:
-        for each in [each for each in self._traces if each.bus == before]:
-            self._traces[each._replace(bus=now)] = self._traces.pop(each)
+        for trace in [each for each in self._traces if each.bus == before]:
+            self._traces[trace._replace(bus=now)] = self._traces.pop(trace)
 
     def forget(self, bus: str) -> None:
-        for each in [each for each in self._traces if each.bus == bus]:
-            del self._traces[each]
+        for trace in [each for each in self._traces if each.bus == bus]:
+            del self._traces[trace]
 
 
-GAP = 1.0
+SHORTEST_GAP = 1.0
 """Seconds without a sample after which a line is interrupted, unless samples come more slowly."""
-FIRST = 2.0
+FIRST_INTERVAL = 2.0
 """The interval, s, that is supposed before it is known; it is not taken for longer than that."""
 
 
@@ -149,7 +149,7 @@ class Columns:
         self.taken = trace.count_at((oldest - 1) * dot)
         self.last = oldest
         """The newest column; samples to come change nothing before it."""
-        self._last_at, self._interval = nan, FIRST
+        self._last_at, self._interval = nan, FIRST_INTERVAL
 
     def update(self, oldest: int) -> None:
         """Take the new samples, and forget columns before `oldest` once they are many."""
@@ -164,7 +164,7 @@ class Columns:
     def _take(self, at: float, value: float) -> None:
         x = floor(at / self.dot)
         interval = at - self._last_at  # not a number for the first sample
-        joined = interval <= max(GAP, 3 * self._interval)
+        joined = interval <= max(SHORTEST_GAP, 3 * self._interval)
         if (column := self.columns.get(x)) is not None:
             low, high, _, come = column
             self.columns[x] = Column(min(low, value), max(high, value), value, come)
@@ -172,7 +172,7 @@ class Columns:
             come = self._reach(x, value) if joined else nan
             self.columns[x] = Column(value, value, value, come)
         if interval > 0:
-            self._interval = min(interval, FIRST)
+            self._interval = min(interval, FIRST_INTERVAL)
         self._last_at, self.last = at, x
 
     def _reach(self, x: int, value: float) -> float:
@@ -189,4 +189,4 @@ class Columns:
         seen = [self.columns[x] for x in range(first, last + 1) if x in self.columns]
         if not seen:
             return None
-        return min(each.low for each in seen), max(each.high for each in seen)
+        return min(column.low for column in seen), max(column.high for column in seen)

@@ -15,10 +15,10 @@ from enum import Enum
 from math import inf
 from typing import NamedTuple
 
-from multidrop.tui.curves.samples import FIRST, GAP, Quantity
+from multidrop.tui.curves.samples import FIRST_INTERVAL, SHORTEST_GAP, TraceQuantity
 
 
-class State(Enum):
+class TriggerState(Enum):
     """The state of a trigger, by the word that is shown."""
 
     OFF = "off"
@@ -27,10 +27,10 @@ class State(Enum):
     HELD = "held"
 
 
-class Setting(NamedTuple):
+class TriggerSetting(NamedTuple):
     """The condition: a level in the drive's numbers, the direction, and the share of the picture before it."""
 
-    quantity: Quantity
+    quantity: TraceQuantity
     level: float
     rising: bool
     before: float
@@ -40,25 +40,25 @@ class Trigger:
     """The state, and the time of the last crossing that counted."""
 
     def __init__(self) -> None:
-        self.state = State.OFF
-        self.setting: Setting | None = None
+        self.state = TriggerState.OFF
+        self.setting: TriggerSetting | None = None
         self.single = False
         self.at = 0.0
         """The time of the crossing; of TRIGGERED and HELD."""
-        self._last_at, self._last_value, self._interval = -inf, 0.0, FIRST
+        self._last_at, self._last_value, self._interval = -inf, 0.0, FIRST_INTERVAL
 
-    def arm(self, setting: Setting, single: bool) -> None:
+    def arm(self, setting: TriggerSetting, single: bool) -> None:
         """Wait for the next crossing, whatever was before."""
-        self.setting, self.single, self.state = setting, single, State.ARMED
-        self._last_at, self._interval = -inf, FIRST
+        self.setting, self.single, self.state = setting, single, TriggerState.ARMED
+        self._last_at, self._interval = -inf, FIRST_INTERVAL
 
     def disarm(self) -> None:
-        self.state = State.OFF
+        self.state = TriggerState.OFF
 
     @property
     def stands(self) -> bool:
         """True if it holds a picture."""
-        return self.state in (State.TRIGGERED, State.HELD)
+        return self.state in (TriggerState.TRIGGERED, TriggerState.HELD)
 
     def end(self, span: float) -> float:
         """The right edge of the picture, of this length."""
@@ -67,27 +67,27 @@ class Trigger:
 
     def take(self, samples: Iterable[tuple[float, float]], span: float, now: float) -> None:
         """Take in the next samples, and the time; `span` is the length of the picture."""
-        for at, value in samples if self.state is not State.OFF else ():
+        for at, value in samples if self.state is not TriggerState.OFF else ():
             self._fill(at, span)
             crossing = self._crossing(at, value)
-            waits = self.state is State.ARMED or (self.state is State.HELD and not self.single)
+            waits = self.state is TriggerState.ARMED or (self.state is TriggerState.HELD and not self.single)
             if crossing is not None and waits:
-                self.state, self.at = State.TRIGGERED, crossing
+                self.state, self.at = TriggerState.TRIGGERED, crossing
             if 0 < at - self._last_at < inf:
-                self._interval = min(at - self._last_at, FIRST)
+                self._interval = min(at - self._last_at, FIRST_INTERVAL)
             self._last_at, self._last_value = at, value
         self._fill(now, span)
 
     def _fill(self, now: float, span: float) -> None:
-        if self.state is State.TRIGGERED and now >= self.end(span):
-            self.state = State.HELD
+        if self.state is TriggerState.TRIGGERED and now >= self.end(span):
+            self.state = TriggerState.HELD
 
     def _crossing(self, at: float, value: float) -> float | None:
         """The time at which the line to this sample reaches the level; None if it does not, or comes after a gap."""
         assert self.setting is not None
         _, level, rising, _ = self.setting
         before = self._last_value
-        if at - self._last_at > max(GAP, 3 * self._interval):
+        if at - self._last_at > max(SHORTEST_GAP, 3 * self._interval):
             return None
         if not (before < level <= value if rising else before > level >= value):
             return None

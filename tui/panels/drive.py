@@ -51,7 +51,7 @@ def lamp_span(lamp: Lamp, old: bool) -> list[Span]:
 
 def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], list[list[Span]]]:
     """The lamps of inputs, and those of outputs, each with its heading before the first one."""
-    found: list[list[list[Span]]] = []
+    of_axes: list[list[list[Span]]] = []
     for output, head in ((False, "in "), (True, "out ")):
         lamps = [lamp for lamp in conditions.lamps if lamp.output is output]
         plain = [lamp for lamp in lamps if lamp.name.isdigit() and not lamp.function]
@@ -63,8 +63,8 @@ def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], li
             groups.append([(f"{plain[0].name}-{plain[-1].name} ", "dim"), (signs, role)])
         if groups:
             groups[0].insert(0, (head, "dim"))
-        found.append(groups)
-    return found[0], found[1]
+        of_axes.append(groups)
+    return of_axes[0], of_axes[1]
 
 
 def error_span(conditions: Conditions, old: bool) -> Span:
@@ -153,7 +153,7 @@ def travel_of(readout: Readout) -> Travel | None:
     if low is not None and high is not None and low < high:
         return Travel(low, high, LEARNT)
     target = readout.conditions.target if readout.conditions is not None else None
-    seen = [each for each in (readout.travel.low, readout.travel.high, target) if each is not None]
+    seen = [end for end in (readout.travel.low, readout.travel.high, target) if end is not None]
     return Travel(min(seen), max(seen), SEEN) if readout.last is not None and min(seen) < max(seen) else None
 
 
@@ -172,7 +172,7 @@ def bar(readout: Readout, width: int) -> str:
     beyond = "◀" if last.position < travel.low else "▶" if last.position > travel.high else ""
     cells[_cell(last.position, travel, width)] = beyond or "●"
     if readout.figures.places.gain < 0:  # the lower end in units is at the left
-        cells = [MIRRORED.get(each, each) for each in reversed(cells)]
+        cells = [MIRRORED.get(cell, cell) for cell in reversed(cells)]
     return "".join(cells)
 
 
@@ -189,7 +189,7 @@ def phase(readout: Readout) -> str:
     if readout.last is None or not readout.last.velocity:
         return ""
     at = readout.last.at
-    before = next((each for each in reversed(readout.points) if at - each.at >= LOOK_BACK), None)
+    before = next((point for point in reversed(readout.points) if at - point.at >= LOOK_BACK), None)
     if before is None:
         return ""
     now, then = abs(readout.last.velocity), abs(before.velocity)
@@ -206,8 +206,8 @@ def seconds_to_go(readout: Readout, now: float) -> float | None:
     left = conditions.target - last.position
     if not last.velocity or (left > 0) != (last.velocity > 0):
         return None
-    found = _duration(abs(left), abs(last.velocity), conditions.pace, braking=phase(readout) == "slows down")
-    return max(0.0, found - (now - last.at))
+    seconds = _duration(abs(left), abs(last.velocity), conditions.pace, braking=phase(readout) == "slows down")
+    return max(0.0, seconds - (now - last.at))
 
 
 def _duration(left: float, speed: float, pace: Pace, *, braking: bool) -> float:
@@ -270,9 +270,9 @@ def alarm_words(trouble: str, axes: Sequence[Readout], room: int) -> str:
     """`≠ +8112 stall, load`, or `✗ error ≠ +8112`, or `✗ error ≠` where there is no room; empty without an alarm."""
     if not trouble:
         return "; ".join(filter(None, map(differs, axes)))
-    found = "; ".join(filter(None, (differs(each, causes=False) for each in axes)))
-    whole = f"✗ {trouble} {found}".rstrip()
-    return whole if len(whole) <= room or not found else f"✗ {trouble} {SIGN}"
+    words = "; ".join(filter(None, (differs(axis, causes=False) for axis in axes)))
+    whole = f"✗ {trouble} {words}".rstrip()
+    return whole if len(whole) <= room or not words else f"✗ {trouble} {SIGN}"
 
 
 def difference_words(axis: Readout) -> str:
@@ -354,8 +354,8 @@ def _troubles(axis: Readout, now: float) -> list[Span]:
     """The trouble that polls report, and the error with its text, which may say the same."""
     known = axis.conditions if axis.conditions is not None and axis.conditions.error else None
     same = known is not None and known.error_text == axis.trouble and not axis.aged(now)
-    found: list[Span] = [(f"✗ {axis.trouble}", "error")] if axis.trouble and not same else []
-    return [*found, error_span(known, axis.aged(now))] if known is not None else found
+    troubles: list[Span] = [(f"✗ {axis.trouble}", "error")] if axis.trouble and not same else []
+    return [*troubles, error_span(known, axis.aged(now))] if known is not None else troubles
 
 
 def unit_of(axis: Readout, otherwise: str) -> str:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from operator import attrgetter
 
 from multidrop.shell.line_syntax import join_target
-from multidrop.tui.curves.raster import BRAILLE, Curve, Frame, Raster, Scale
+from multidrop.tui.curves.raster import BRAILLE, Curve, PlotFrame, Raster, TickScale
 from multidrop.tui.curves.samples import Columns, Trace
 from multidrop.tui.panels.drive import (
     NUMBER,
@@ -28,12 +28,14 @@ from multidrop.tui.panels.drive import (
     trouble_of,
 )
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
-from multidrop.tui.readout import READ, SPAN, Point, Readout, State
+from multidrop.tui.readout import READ, SPAN, PlottedPoint, Readout, ReadoutState
 from multidrop.tui.text import age, fit
-from multidrop.tui.widgets.lines import Link, Row, Span, spread, width_of
+from multidrop.tui.widgets.lines import ActionText, Row, Span, spread, width_of
 
 
-def spark(readout: Readout, now: float, width: int, value: Callable[[Point], int] = attrgetter("position")) -> str:
+def spark(
+    readout: Readout, now: float, width: int, value: Callable[[PlottedPoint], int] = attrgetter("position")
+) -> str:
     """Draw a value of the first axis; a resting drive is a line at the foot, and what was not read stays empty."""
     if not readout.points or width < 1:
         return " " * max(0, width)
@@ -47,7 +49,7 @@ def spark(readout: Readout, now: float, width: int, value: Callable[[Point], int
     first = math.floor(now / dot) // 2 - width + 1
     columns = Columns(trace, dot, 2 * first)
     columns.update(2 * first)
-    frame = Frame(first, width, 1, Scale(low, high if high > low else low + 1, 1), BRAILLE)
+    frame = PlotFrame(first, width, 1, TickScale(low, high if high > low else low + 1, 1), BRAILLE)
     return "".join(text for text, _ in Raster().draw([Curve(columns, 0)], frame)[0])
 
 
@@ -55,7 +57,7 @@ NAME = 9
 STATE = 14
 BAR = 10
 VELOCITY = 12
-MOST = 3
+MOST_SHOWN_DRIVES = 3
 """Drives that a narrow screen shows above its lamps."""
 
 
@@ -64,7 +66,7 @@ def narrow_rows(view: View, width: int) -> list[Row]:
     chosen, now = view.chosen, view.now
     if chosen is None:
         return [((fit(" no drive selected   ^O chooses one", width), "dim"),), ()]
-    shown = kept(view.glances, MOST)
+    shown = kept(view.glances, MOST_SHOWN_DRIVES)
     rows: list[Row] = []
     for glance in shown:  # a row for each axis of the selected drive, and one for any other drive
         axes = glance.readout.axes if glance.selected else [glance.readout]
@@ -97,7 +99,7 @@ def _in_trouble(glances: Sequence[Glance]) -> str:
 
 def _troubled(glance: Glance) -> bool:
     in_trouble = any(map(trouble_of, glance.readout.axes)) or glance.readout.differs
-    return in_trouble or glance.state() in (State.SILENT, State.LOST)
+    return in_trouble or glance.state() in (ReadoutState.SILENT, ReadoutState.LOST)
 
 
 def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: bool) -> Row:
@@ -122,7 +124,7 @@ def _name(glance: Glance, axis: Readout, *, first: bool) -> Span:
     pointer = "▸" if glance.selected and first else " "
     name = f"{glance.address} {glance.label}".strip() or "drive"
     shown = f"{name} {axis.axis}".rstrip() if first else axis.axis.rjust(len(name) + 1 if axis.axis else 0)
-    text = Link(f"{pointer}{fit(shown, NAME - 1)} ", f"act.select({glance.address!r})")
+    text = ActionText(f"{pointer}{fit(shown, NAME - 1)} ", f"act.select({glance.address!r})")
     return text, "accent" if glance.selected else "text"
 
 
@@ -133,9 +135,9 @@ def short_words(glance: Glance, axis: Readout, now: float) -> str:
         state = axis.own_state
         if glance.readout.old(now):
             return fit(f"{state.sign} {age(now - axis.last.at)} ago", STATE)
-    if state is State.SILENT and glance.readout.silent_since is not None:
+    if state is ReadoutState.SILENT and glance.readout.silent_since is not None:
         return fit(f"{state.sign} silent {age(now - glance.readout.silent_since)}", STATE)
-    return fit(f"{state.sign} {'not read' if state is State.UNKNOWN else state.word}", STATE)
+    return fit(f"{state.sign} {'not read' if state is ReadoutState.UNKNOWN else state.word}", STATE)
 
 
 def _besides(glance: Glance, axis: Readout, now: float, room: int, *, live: bool) -> Span:
@@ -155,7 +157,7 @@ def drives_rows(view: View, width: int, height: int) -> list[Row]:
     """A row for each drive of the selected bus, with its position over the last seconds; then those of other lines."""
     shown = kept(view.glances, height if len(view.glances) <= height else height - 1)
     rows = [_panel_row(glance, view.now, width) for glance in shown]
-    left = [each for each in view.glances if not any(each is kept_one for kept_one in shown)]
+    left = [glance for glance in view.glances if not any(glance is kept_one for kept_one in shown)]
     for bus in view.session.tabs.shown:
         if bus.name == view.session.selected_bus:
             continue
@@ -163,8 +165,8 @@ def drives_rows(view: View, width: int, height: int) -> list[Row]:
         if left or len(rows) + len(glances) > height:
             left += glances
             continue
-        for each in glances:
-            named = replace(each, address=join_target(bus.name, each.address).removesuffix(":"), label="")
+        for glance in glances:
+            named = replace(glance, address=join_target(bus.name, glance.address).removesuffix(":"), label="")
             rows.append(_panel_row(named, view.now, width))
     if left and len(rows) < height:
         trouble = _in_trouble(left)
@@ -186,8 +188,8 @@ def _panel_row(glance: Glance, now: float, width: int) -> Row:
         text = to_go_words(glance.readout, now)
     elif text.startswith(SIGN):
         text = differs(glance.readout, causes=False)
-    stale = role == "dim" and state is not State.UNKNOWN and not text
-    if state in (State.SILENT, State.LOST, State.STORING) or stale:
+    stale = role == "dim" and state is not ReadoutState.UNKNOWN and not text
+    if state in (ReadoutState.SILENT, ReadoutState.LOST, ReadoutState.STORING) or stale:
         text, text_role = short_words(glance, glance.readout, now)[2:].strip(), state_role
     shown = min(len(text) + 1, room) if text else 0
     drawn = spark(glance.readout, now, room - shown)

@@ -26,7 +26,7 @@ KEY = 12
 """Width of a key, or of a line to type; few are longer."""
 FUNCTIONS = ("palette", "drive", "find", "history", "pause", "save", "twin", "units", "macro-page")
 """What is offered besides the pages, by the names of `tui.key_table`."""
-LINES = {
+FACT_LINES = {
     "/tour": "a walk through all of this",
     "/open URL": "one more line of drives",
     "/log on": "keep sent and received bytes",
@@ -39,10 +39,10 @@ def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
     session, readout = view.session, glance.readout
     drive = bus.drives[glance.address]
     for axis in readout.axes:
-        found = session.units.of(drive, axis.axis) if session.scaled else None
-        scale = found.scale if found is not None else None
+        scaled = session.units.of(drive, axis.axis) if session.scaled else None
+        scale = scaled.scale if scaled is not None else None
         unit = unit_of(axis, glance.unit)
-        fails = "does not hold now" if found is not None and not found.holds else ""
+        fails = "does not hold now" if scaled is not None and not scaled.holds else ""
         text = (
             (axis.figures.unit or unit)
             if scale is None
@@ -117,11 +117,11 @@ def card_rows(view: View, bus: Bus, glance: Glance, width: int) -> list[Row]:
     about = " ".join(filter(None, (glance.product, firmware_of(glance))))
     *facts, (_, has) = facts_of(view, bus, glance)
     columns = max(n for n in (1, 2, 4) if n == 1 or width >= n * COLUMN)
-    each = width // columns
+    column_width = width // columns
     head: Row = ((fit(f"   {name_of(glance)}", 3 + WORD), "strong"), (f" {about} ", "text"))
     rows: list[Row] = [spread(head, [(f"{has} ", "dim")], width)]
     for first in range(0, len(facts), columns):
-        rows.append(tuple(span for fact in facts[first : first + columns] for span in _fact(fact, each, "   ")))
+        rows.append(tuple(span for fact in facts[first : first + columns] for span in _fact(fact, column_width, "   ")))
     return rows
 
 
@@ -134,10 +134,13 @@ def next_rows(view: View, width: int, height: int) -> list[Row]:
     """What to press or to type: what the state asks for, macros on keys, pages, functions, lines."""
     offers = [*_asked_for(view), *_macros(view)] if view.works else []
     about = view.keys.about
-    for name in (*(each for each in about if each.startswith("page-")), *(each for each in FUNCTIONS if each in about)):
+    for name in (
+        *(each for each in about if each.startswith("page-")),
+        *(function for function in FUNCTIONS if function in about),
+    ):
         key = view.keys.shown(name) or (f"/page {name.removeprefix('page-')}" if name.startswith("page-") else "")
         offers += [(key, about[name])] if key else []
-    offers += LINES.items() if view.works else ()
+    offers += FACT_LINES.items() if view.works else ()
     shown = [(f" {key:<{KEY}} ", words) for key, words in offers[:height]]
     return [((key, "key"), (fit(words, width - len(key)), "dim")) for key, words in shown]
 

@@ -10,31 +10,31 @@ from collections.abc import Mapping, Sequence
 from math import floor
 from typing import NamedTuple
 
-from multidrop.tui.curves.chart import Chart, Extent, Look, Window
-from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Scale, row_of, ticks, with_cursor
-from multidrop.tui.curves.samples import Quantity
-from multidrop.tui.curves.trigger import State
-from multidrop.tui.panels.plotted import PLOTTED, Group, Line, groups, role_of
+from multidrop.tui.curves.chart import Chart, ChartView, ColumnWindow, Extent
+from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, TickScale, row_of, ticks, with_cursor
+from multidrop.tui.curves.samples import TraceQuantity
+from multidrop.tui.curves.trigger import TriggerState
+from multidrop.tui.panels.plotted import PLOTTED, ChartGroup, PlottedLine, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.text import age, fit, short
 from multidrop.tui.widgets.lines import Row, Span, beside, width_of
 
 AXIS = 10
 """Width of the axis of values in cells: label, space, tick."""
-LEAST = {"velocity": 100.0, "position": 10.0}
+LEAST_SPANS = {"velocity": 100.0, "position": 10.0}
 """The least width of a scale."""
-WIDE, HEADS = 64, 3
+WIDE_FROM, HEADS = 64, 3
 """Width of a plot from which a legend may have several rows, and the most of them."""
 _ROLES = {EMPTY: "text", CURSOR: "strong", **{n: role_of(n) for n in range(2 * TWINS)}}
 """The role of a cell by its owner."""
 
 
-class Shown(NamedTuple):
+class ShownGroup(NamedTuple):
     """A group as it is shown: its chart, the extents of what moves, and words for what does not."""
 
-    group: Group
+    group: ChartGroup
     chart: Chart
-    moving: dict[Line, Extent]
+    moving: dict[PlottedLine, Extent]
     words: tuple[Row, ...]
 
 
@@ -43,16 +43,16 @@ def columns_of(width: int) -> int:
     return max(1, width - AXIS)
 
 
-def chart_rows(view: View, shown: Shown, window: Window, height: int) -> list[Row]:
+def chart_rows(view: View, shown: ShownGroup, window: ColumnWindow, height: int) -> list[Row]:
     """The rows of a chart, from top to bottom."""
     if height < 1:
         return []
     look = view.model.look
     scale = _scale(view, shown, height)
-    lines: list[tuple[Quantity, int, Scale]] = []
+    lines: list[tuple[TraceQuantity, int, TickScale]] = []
     for line in shown.moving:  # each in the numbers that are plotted, whose scale falls where their sign is turned
         gain, zero = line.conversion
-        own = Scale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
+        own = TickScale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
         lines.append((line.quantity, line.stroke, own))
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
     marks = ticks(scale, height)
@@ -62,9 +62,9 @@ def chart_rows(view: View, shown: Shown, window: Window, height: int) -> list[Ro
         if at is not None
     ]
     setting, level = look.trigger.setting, -1
-    if look.trigger.state is not State.OFF and setting is not None:
+    if look.trigger.state is not TriggerState.OFF and setting is not None:
         plotted = [line.conversion.value(setting.level) for line in shown.moving if line.quantity == setting.quantity]
-        level = next((row_of(each, scale, height) for each in plotted if scale.low <= each <= scale.high), -1)
+        level = next((row_of(value, scale, height) for value in plotted if scale.low <= value <= scale.high), -1)
     in_units = any(line.figures.unit for line in shown.moving)
     rows: list[Row] = []
     for y, runs in enumerate(drawn):
@@ -82,22 +82,22 @@ def chart_rows(view: View, shown: Shown, window: Window, height: int) -> list[Ro
     return rows
 
 
-def _scale(view: View, shown: Shown, rows: int) -> Scale:
+def _scale(view: View, shown: ShownGroup, rows: int) -> TickScale:
     """The scale of what moves; magnified around the cursor, or around the newest value."""
     look, word = view.model.look, shown.group.word
     first = next(iter(shown.moving))
     centre = shown.chart.value_at(first.quantity, view.now if look.cursor is None else look.cursor)
     trace = view.model.traces.get(first.quantity)
     newest = trace.values[-1] if trace is not None and trace.values else 0.0
-    extents = [line.extent(each) for line, each in shown.moving.items()]
+    extents = [line.extent(extent) for line, extent in shown.moving.items()]
     if word == "position":  # a stated travel is the range of the chart
         extents += [line.extent(Extent(*line.figures.travel)) for line in shown.moving if line.figures.travel]
     middle, convert = newest if centre is None else centre, first.conversion
-    least = LEAST.get(word, 1.0) * abs(convert.gain)
+    least = LEAST_SPANS.get(word, 1.0) * abs(convert.gain)
     return shown.chart.scale(extents, least, word == "velocity", look.zoom, convert.value(middle), rows)
 
 
-def time_row(view: View, window: Window) -> Row:
+def time_row(view: View, window: ColumnWindow) -> Row:
     """The times below the charts, in even steps: seconds before now; of a picture that stands, the time of day."""
     look = view.model.look
     end = view.now if look.paused_at is None else look.paused_at
@@ -128,11 +128,11 @@ def _time_words(view: View, base: float, n: int, step: float) -> str:
     return f"{n * step / 60:{side}.3g} min" if step >= 60 else f"{n * step:{side}.3g} s"
 
 
-REST = 2.0
+REST_STEPS = 2.0
 """Steps by which the position of a drive at rest may change: an encoder between two counts."""
 SAID = 8
 """Most rows of words of a chart."""
-LOW = 3
+LOWEST_CHART = 3
 """Least rows of a chart."""
 ROOM = AXIS + 8
 HALF, HIGH = 36, 6
@@ -147,7 +147,7 @@ def plot_title(view: View) -> Row:
     return ((" plot ", "strong"), (f"{_span_words(look)} {rate_words(view)} {hidden}{zoomed}", "dim"))
 
 
-def _head(view: View, shown: Shown, width: int) -> list[Row]:
+def _head(view: View, shown: ShownGroup, width: int) -> list[Row]:
     """The title of a chart, its unit, and its legend: each curve by name, with its last value or that at the cursor.
 
     The names that people gave, then the values, are left out where there is no room for them.
@@ -168,30 +168,30 @@ def _head(view: View, shown: Shown, width: int) -> list[Row]:
                 row = [("  ", "text")]
             row += piece
         rows.append(tuple(row))
-        if len(rows) <= (HEADS if width >= WIDE else 1) and width_of(rows[-1]) <= width:
+        if len(rows) <= (HEADS if width >= WIDE_FROM else 1) and width_of(rows[-1]) <= width:
             return rows
     left = list(rows[0])
     while width_of(left) > width and len(left) > 1:
         left.pop()
-    return [tuple(left), *rows[1:]][: HEADS if width >= WIDE else 1]
+    return [tuple(left), *rows[1:]][: HEADS if width >= WIDE_FROM else 1]
 
 
-def _value_span(view: View, shown: Shown, line: Line) -> Span:
+def _value_span(view: View, shown: ShownGroup, line: PlottedLine) -> Span:
     """The last value of a line, or that at the cursor or the edge, as wide as any in its picture: so nothing jumps."""
     look, trace = view.model.look, view.model.traces.get(line.quantity)
-    at = next((each for each in (look.cursor, look.zero, look.paused_at) if each is not None), None)
+    at = next((time for time in (look.cursor, look.zero, look.paused_at) if time is not None), None)
     if at is not None:
         value = shown.chart.value_at(line.quantity, at)
     else:
         value = trace.values[-1] if trace is not None and trace.values else None
     extent = shown.moving.get(line, Extent(value or 0.0, value or 0.0))
     text = "–" if value is None else line.text(value)
-    text = f"{text:>{max(len(line.text(each)) for each in extent)}} "
+    text = f"{text:>{max(len(line.text(end)) for end in extent)}} "
     missed = trace.overdue(view.now) if trace is not None and at is None else 0.0
     return (f"{text}({age(missed)}) ", "dim") if missed else (text, "strong")
 
 
-def _span_words(look: Look) -> str:
+def _span_words(look: ChartView) -> str:
     span = f"{look.span:.0f} s" if look.span < 120 else f"{look.span / 60:.0f} min"
     if look.paused_at is None:
         return f"last {span} "
@@ -212,12 +212,12 @@ def rate_words(view: View) -> str:
 
 def panel_rows(view: View, width: int, height: int) -> list[Row]:
     """The charts of the panel: velocities beside positions where they would be low, one below the other."""
-    found = groups(view)
-    if len(found) > 2 and width >= 2 * HALF and height < HIGH * len(found):
+    charts = groups(view)
+    if len(charts) > 2 and width >= 2 * HALF and height < HIGH * len(charts):
         half = width // 2
-        speeds = [each for each in found if each.word == PLOTTED[0]]
+        speeds = [group for group in charts if group.word == PLOTTED[0]]
         left = _charts(view, speeds, half - 1, height)
-        right = _charts(view, [each for each in found if each not in speeds], width - half, height)
+        right = _charts(view, [group for group in charts if group not in speeds], width - half, height)
         return beside(left, right, half)
     return plot_rows(view, width, height)
 
@@ -227,7 +227,7 @@ def plot_rows(view: View, width: int, height: int) -> list[Row]:
     return _charts(view, groups(view), width, height)
 
 
-def _charts(view: View, found: Sequence[Group], width: int, height: int) -> list[Row]:
+def _charts(view: View, found: Sequence[ChartGroup], width: int, height: int) -> list[Row]:
     if not found:
         return [((fit(" nothing to plot: no drive is selected", width), "dim"),)]
     if width < ROOM or height < 1:
@@ -258,11 +258,11 @@ def _charts(view: View, found: Sequence[Group], width: int, height: int) -> list
             words.append((*_words(view, line, extent, velocities.get(line.quantity[:3])), *too))
         if len(words) > SAID:
             words[SAID - 1 :] = [((f" and {len(words) - SAID + 1} more that do not change", "dim"),)]
-        shown.append(Shown(group, chart, moving, tuple(words)))
+        shown.append(ShownGroup(group, chart, moving, tuple(words)))
     return _stacked(view, shown, window, width, height)
 
 
-def _take(view: View, group: Group, window: Window) -> tuple[Group, Chart, dict[Line, Extent]]:
+def _take(view: View, group: ChartGroup, window: ColumnWindow) -> tuple[ChartGroup, Chart, dict[PlottedLine, Extent]]:
     charts = view.model.look.charts
     key = (group.word, group.key, window.columns)
     if key not in charts and len(charts) > 32:
@@ -272,19 +272,19 @@ def _take(view: View, group: Group, window: Window) -> tuple[Group, Chart, dict[
     return group, chart, {line: extents[line.quantity] for line in group.lines if line.quantity in extents}
 
 
-def _agree(twin: Line, extents: Mapping[Line, Extent]) -> bool:
+def _agree(twin: PlottedLine, extents: Mapping[PlottedLine, Extent]) -> bool:
     own, predicted = extents.get(twin.of_drive), extents.get(twin)
     if own is None or predicted is None:
         return False
-    return max(abs(own.low - predicted.low), abs(own.high - predicted.high)) <= REST
+    return max(abs(own.low - predicted.low), abs(own.high - predicted.high)) <= REST_STEPS
 
 
-def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> float:
+def _slack(line: PlottedLine, velocities: Mapping[tuple[str, str, str], Extent]) -> float:
     resting = velocities.get(line.quantity[:3]) == (0, 0)
-    return REST if line.of_drive.quantity.word == "position" and resting else 0.0
+    return REST_STEPS if line.of_drive.quantity.word == "position" and resting else 0.0
 
 
-def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | None) -> Row:
+def _words(view: View, line: PlottedLine, extent: Extent | None, velocity: Extent | None) -> Row:
     """`a gantry at rest at 51300 steps`; what is not known is said."""
     measured = line.of_drive.quantity.word
     word = "" if measured in PLOTTED else f"{measured} "
@@ -303,25 +303,25 @@ def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | Non
     return ((name, role_of(line.number)), (text, "text"))
 
 
-def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, height: int) -> list[Row]:
+def _stacked(view: View, shown: Sequence[ShownGroup], window: ColumnWindow, width: int, height: int) -> list[Row]:
     """The groups one below the other; those that find no room are named."""
-    kept = [each for each in shown if each.moving or each.words]
+    kept = [group for group in shown if group.moving or group.words]
     left_out: list[str] = []
     while len(kept) > 1 and _least(kept) + bool(left_out) > height:
         left_out.append(kept.pop().group.title)
-    heads = [_head(view, each, width) for each in kept if each.moving]
-    if sum(map(len, heads)) + (LOW + 1) * len(heads) > height:
+    heads = [_head(view, group, width) for group in kept if group.moving]
+    if sum(map(len, heads)) + (LOWEST_CHART + 1) * len(heads) > height:
         heads = [head[:1] for head in heads]
     charts = len(heads)
-    room = height - sum(map(len, heads)) - sum(len(each.words) for each in kept) - bool(left_out)
-    timed = bool(charts) and room - 1 >= (LOW + 1) * charts
+    room = height - sum(map(len, heads)) - sum(len(group.words) for group in kept) - bool(left_out)
+    timed = bool(charts) and room - 1 >= (LOWEST_CHART + 1) * charts
     rows: list[Row] = []
-    shares = _shares([each for each in kept if each.moving], room - timed)
-    for each in kept:
-        rows += each.words
-        if each.moving:
+    shares = _shares([group for group in kept if group.moving], room - timed)
+    for group in kept:
+        rows += group.words
+        if group.moving:
             rows += heads.pop(0)
-            rows += chart_rows(view, each, window, shares.pop(0))
+            rows += chart_rows(view, group, window, shares.pop(0))
     if timed:
         rows.append(time_row(view, window))
     if left_out:
@@ -329,16 +329,16 @@ def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, hei
     return rows[:height]
 
 
-def _shares(moving: Sequence[Shown], room: int) -> list[int]:
+def _shares(moving: Sequence[ShownGroup], room: int) -> list[int]:
     """The rows of each chart: few for a switch beside other charts, the rest in equal parts."""
     switches = sum(map(_is_switch, moving))
     if switches == len(moving):
         switches = 0
-    low = min(LOW, room // max(1, len(moving)))
+    low = min(LOWEST_CHART, room // max(1, len(moving)))
     others, left = len(moving) - switches, room - switches * low
     shares = []
-    for each in moving:
-        if switches and _is_switch(each):
+    for group in moving:
+        if switches and _is_switch(group):
             shares.append(low)
         else:
             shares.append(left // others)
@@ -346,10 +346,10 @@ def _shares(moving: Sequence[Shown], room: int) -> list[int]:
     return shares
 
 
-def _is_switch(shown: Shown) -> bool:
+def _is_switch(shown: ShownGroup) -> bool:
     """True if a chart has only values between 0 and 1, which need few rows."""
     return shown.group.word not in PLOTTED and all(low >= 0 and high <= 1 for low, high in shown.moving.values())
 
 
-def _least(shown: Sequence[Shown]) -> int:
-    return sum(len(each.words) + (1 + LOW if each.moving else 0) for each in shown)
+def _least(shown: Sequence[ShownGroup]) -> int:
+    return sum(len(group.words) + (1 + LOWEST_CHART if group.moving else 0) for group in shown)

@@ -10,8 +10,8 @@ from multidrop.dialects.values import Conditions
 from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.tui.curves.chart import Extent
 from multidrop.tui.curves.raster import TWINS
-from multidrop.tui.curves.samples import PREDICTED, Quantity
-from multidrop.tui.figures import NATIVE, Conversion, Figures, fixed
+from multidrop.tui.curves.samples import PREDICTED, TraceQuantity
+from multidrop.tui.figures import NATIVE, Figures, UnitConversion, fixed
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import moved_lately, plotted
 from multidrop.tui.readout import Readout
@@ -22,11 +22,11 @@ PLOTTED = ("velocity", "position")
 _MEASURED = {predicted: measured for measured, predicted in PREDICTED.items()}
 
 
-class Line(NamedTuple):
+class PlottedLine(NamedTuple):
     """A quantity that is plotted: its drive's name, its unit, and the number of its colour and dashes."""
 
     name: str
-    quantity: Quantity
+    quantity: TraceQuantity
     unit: str
     number: int
     twin: bool = False
@@ -39,18 +39,18 @@ class Line(NamedTuple):
         return self.number + TWINS * self.twin
 
     @property
-    def of_drive(self) -> Line:
+    def of_drive(self) -> PlottedLine:
         if not self.twin:
             return self
         return self._replace(twin=False, quantity=self.quantity._replace(word=_MEASURED[self.quantity.word]))
 
     @property
-    def conversion(self) -> Conversion:
+    def conversion(self) -> UnitConversion:
         """What is plotted in the unit that is shown."""
         word, figures = self.of_drive.quantity.word, self.figures
         if word == DIFFERENCE:
-            return Conversion(figures.places.gain)
-        return {"velocity": figures.speeds, "position": figures.places}.get(word, Conversion())
+            return UnitConversion(figures.places.gain)
+        return {"velocity": figures.speeds, "position": figures.places}.get(word, UnitConversion())
 
     def text(self, plotted: float) -> str:
         """A plotted value; in units with its unit, else a whole number has no decimals."""
@@ -81,13 +81,13 @@ class Line(NamedTuple):
         return " ".join(filter(None, (where, axis if axis != where else "", "twin" if self.twin else "")))
 
 
-class Group(NamedTuple):
+class ChartGroup(NamedTuple):
     """The lines that share a chart: those of one quantity in one unit, as no axis has two."""
 
     word: str
     key: str
     """The drive, where each has charts of its own."""
-    lines: tuple[Line, ...]
+    lines: tuple[PlottedLine, ...]
 
     @property
     def title(self) -> str:
@@ -115,12 +115,12 @@ def plot_shows(view: View) -> bool:
 
 def _numbers(view: View, drawn: Sequence[Series]) -> dict[tuple[str, str, str], int]:
     """The number of the colour of each axis: it stays while the axis is plotted, whatever else moves."""
-    axes = [(*each[:2], axis) for each in drawn for axis in _axes(view, each)]
+    axes = [(*line[:2], axis) for line in drawn for axis in _axes(view, line)]
     held = view.model.look.numbers
     for gone in held.keys() - set(axes):
         del held[gone]
-    for each in axes:
-        held.setdefault(each, next(number for number in count() if number not in held.values()))
+    for axis in axes:
+        held.setdefault(axis, next(number for number in count() if number not in held.values()))
     return held
 
 
@@ -128,12 +128,12 @@ def _axes(view: View, series: Series) -> list[str]:
     return (view.model.traces.axes(*series[:2]) if series.of_motion else []) or [""]
 
 
-def groups(view: View) -> list[Group]:
+def groups(view: View) -> list[ChartGroup]:
     """The plotted lines by chart: velocities, positions, then values by their words. A twin's follow their drive's."""
-    found: dict[tuple[str, str], list[Line]] = {}
+    by_unit: dict[tuple[str, str], list[PlottedLine]] = {}
     drawn = shown_series(view)
     numbers = _numbers(view, drawn)
-    several = len({each.bus for each in drawn}) > 1
+    several = len({line.bus for line in drawn}) > 1
     for each_drawn in drawn:
         bus, address, word = each_drawn
         for axis in _axes(view, each_drawn):
@@ -141,20 +141,24 @@ def groups(view: View) -> list[Group]:
             drive = view.session.buses[bus].drives[address]
             where = ":".join(filter(None, (bus if several or not address else "", address)))
             name = " ".join(filter(None, (where, drive.label, axis)))
-            for each in [word] if word else PLOTTED:
-                unit, figures = _unit(view, bus, address, axis, each) if word in ("", DIFFERENCE) else ("", NATIVE)
+            for plotted_word in [word] if word else PLOTTED:
+                unit, figures = (
+                    _unit(view, bus, address, axis, plotted_word) if word in ("", DIFFERENCE) else ("", NATIVE)
+                )
                 key = " ".join(filter(None, (name if view.model.look.apart else "", unit)))
-                lines = found.setdefault((each, key), [])
-                lines.append(Line(name, Quantity(bus, address, axis, each), unit, number, figures=figures))
-                if not word and _recent(view, predicted := Quantity(bus, address, axis, PREDICTED[each])):
-                    lines.append(Line(name, predicted, unit, number, twin=True, figures=figures))
-    order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
+                lines = by_unit.setdefault((plotted_word, key), [])
+                lines.append(
+                    PlottedLine(name, TraceQuantity(bus, address, axis, plotted_word), unit, number, figures=figures)
+                )
+                if not word and _recent(view, predicted := TraceQuantity(bus, address, axis, PREDICTED[plotted_word])):
+                    lines.append(PlottedLine(name, predicted, unit, number, twin=True, figures=figures))
+    order = sorted(by_unit, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
     if view.model.look.apart:
-        order = sorted(order, key=lambda key: min(line.number for line in found[key]))
-    return [Group(*key, tuple(found[key])) for key in order if key[0] not in view.model.look.hidden]
+        order = sorted(order, key=lambda key: min(line.number for line in by_unit[key]))
+    return [ChartGroup(*key, tuple(by_unit[key])) for key in order if key[0] not in view.model.look.hidden]
 
 
-def _recent(view: View, predicted: Quantity) -> bool:
+def _recent(view: View, predicted: TraceQuantity) -> bool:
     """True if a twin has predicted in the time that is shown, also one that has ended since."""
     look, trace = view.model.look, view.model.traces.get(predicted)
     end = view.now if look.paused_at is None else look.paused_at
@@ -163,8 +167,8 @@ def _recent(view: View, predicted: Quantity) -> bool:
 
 def _unit(view: View, bus: str, address: str, axis: str, quantity: str) -> tuple[str, Figures]:
     """`mm`, `steps`, or what the drive counts; of a velocity, that a second or a unit of its own; with the figures."""
-    found = next((each for each in view.model.bus(bus).readout(address).axes if each.axis == axis), Readout())
-    figures, own = found.figures, found.conditions or Conditions()
+    axis_there = next((each for each in view.model.bus(bus).readout(address).axes if each.axis == axis), Readout())
+    figures, own = axis_there.figures, axis_there.conditions or Conditions()
     if quantity == "velocity":
         return (f"{figures.speed_unit}{figures.sign}" if figures.speed_unit else own.speed_unit), figures
     return (f"{figures.unit}{figures.sign}" if figures.unit else own.unit), figures

@@ -25,7 +25,7 @@ from multidrop.tui.panels.plot import panel_rows, plot_title
 from multidrop.tui.panels.plotted import plot_shows
 from multidrop.tui.panels.program import program_rows, program_shows, program_title
 from multidrop.tui.panels.view import View, names_on
-from multidrop.tui.screen_model import Piece
+from multidrop.tui.screen_model import TrafficPiece
 from multidrop.tui.text import at_words, fit, visible
 from multidrop.tui.widgets.lines import Row, width_of
 
@@ -84,7 +84,9 @@ def traffic_title(view: View) -> Row:
     return ((f" traffic {view.session.selected_bus} ", "strong"), ("without polls ", "dim"))
 
 
-def piece_rows(piece: Piece, wall: Wall, width: int, names: Mapping[str, str], hex_too: bool = True) -> list[Row]:
+def piece_rows(
+    piece: TrafficPiece, wall: Wall, width: int, names: Mapping[str, str], hex_too: bool = True
+) -> list[Row]:
     """A piece as rows: time, direction, drive by its name, then text and hex, or text alone where there is no room."""
     at = wall(piece.at)
     clock = f"{at:%H:%M:%S}.{at.microsecond // 1000:03}"
@@ -113,7 +115,7 @@ def piece_rows(piece: Piece, wall: Wall, width: int, names: Mapping[str, str], h
 
 def _dots(data: bytes) -> str:
     """Bytes as text of the same length, beside their hex: a dot for each that is not printable."""
-    return "".join(chr(each) if 0x20 <= each < 0x7F else "·" for each in data)
+    return "".join(chr(byte) if 0x20 <= byte < 0x7F else "·" for byte in data)
 
 
 MOTION, CONDITIONS, PLOT = "motion", "conditions", "plot"
@@ -172,10 +174,10 @@ LAYOUTS: dict[tuple[bool, bool], dict[str, Places]] = {
 
 
 def panel(name: str) -> Panel:
-    return next(each for each in PANELS if each.name == name)
+    return next(panel for panel in PANELS if panel.name == name)
 
 
-class Shown:
+class ShownPanels:
     """The panels that a person shows and hides."""
 
     def __init__(self) -> None:
@@ -203,7 +205,7 @@ class Shown:
             self._alone = name if on else ""
 
 
-HEAD = 1
+HEAD_ROWS = 1
 """Rows of a title."""
 
 
@@ -216,19 +218,19 @@ def fitting(places: Sequence[Place], height: int) -> list[Place]:
     """The places that find room, first come, first served."""
     shown: list[Place] = []
     for place in places:
-        if sum(each[0].least + HEAD for each in [*shown, place]) <= height:
+        if sum(panel[0].least + HEAD_ROWS for panel in [*shown, place]) <= height:
             shown.append(place)
     return shown
 
 
 def heights(places: Sequence[Place], height: int) -> list[int]:
     """The rows of each place with its title; the last one takes what the others cannot use."""
-    room = height - sum(place[0].least + HEAD for place in places)
+    room = height - sum(place[0].least + HEAD_ROWS for place in places)
     given: list[int] = []
     for number, (first, *_) in enumerate(places):
         spare = -(-room // (len(places) - number))
         more = spare if number == len(places) - 1 else min(first.most - first.least, spare)
-        given.append(first.least + HEAD + more)
+        given.append(first.least + HEAD_ROWS + more)
         room -= more
     return given
 
@@ -255,15 +257,15 @@ def column_rows(places: Sequence[Place], view: View, width: int, height: int, bo
 def _place_rows(place: Place, view: View, width: int, height: int, side: Row) -> list[Row]:
     """The rows of a place: its panels that have something to show, each in the rows that those before it leave."""
     rows: list[Row] = []
-    for each in [panel for panel in place if _shows(panel, view)] or place[:1]:
-        room = height - len(rows) - HEAD
-        if room < (each.least if rows else 0):
+    for panel in [panel for panel in place if _shows(panel, view)] or place[:1]:
+        room = height - len(rows) - HEAD_ROWS
+        if room < (panel.least if rows else 0):
             break
         inside = width - len(side)
         title, content = view.boundary.do(
-            f"the panel {each.name}",
-            partial(_panel_rows, each, view, width, inside, room, "├" if side else "─"),
-            partial(_defect_rows, each, width, inside, "├" if side else "─"),
+            f"the panel {panel.name}",
+            partial(_panel_rows, panel, view, width, inside, room, "├" if side else "─"),
+            partial(_defect_rows, panel, width, inside, "├" if side else "─"),
         )
         rows.append(title)
         rows += [(*side, *row) for row in content[:room]]

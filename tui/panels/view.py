@@ -13,7 +13,7 @@ from multidrop.shell.session import Session
 from multidrop.tui.boundary import Boundary
 from multidrop.tui.figures import NATIVE, Figures, figures_of
 from multidrop.tui.keymap import FunctionKeys, Keymap
-from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.readout import READ, Readout, ReadoutState
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Span
@@ -49,17 +49,17 @@ class Glance:
         """True if the position of an axis is not known to have lost its reference."""
         return not self.unreferenced & {axis.axis, ""}
 
-    def state(self) -> State:
+    def state(self) -> ReadoutState:
         """The state as last read; LOST on a lost bus, where nothing else is known."""
-        return State.LOST if self.lost else self.readout.state(storing=self.storing)
+        return ReadoutState.LOST if self.lost else self.readout.state(storing=self.storing)
 
     def sign(self, now: float) -> Span:
         state = self.state()
         words = state.word if self.lost else self.readout.words(now, storing=self.storing)
         aged = state in READ and self.readout.old(now)
-        if state is State.NO_CURRENT and self.readout.touched > self.readout.conditioned_at:
+        if state is ReadoutState.NO_CURRENT and self.readout.touched > self.readout.conditioned_at:
             aged = True  # a line was sent since, which may have switched it on
-        aged = aged or (state is State.DWELL and self.readout.program_aged(now))
+        aged = aged or (state is ReadoutState.DWELL and self.readout.program_aged(now))
         return fit(f"{state.sign} {words}", STATE), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:

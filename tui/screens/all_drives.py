@@ -15,28 +15,35 @@ from multidrop.tui.panels.facts import selected_rows
 from multidrop.tui.panels.plot import plot_rows
 from multidrop.tui.panels.table import panel, title_row
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
-from multidrop.tui.readout import State
-from multidrop.tui.screens.page import Host, ListPage
+from multidrop.tui.readout import ReadoutState
+from multidrop.tui.screens.page import ListPage, PageHost
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row, Span, beside, spread, width_of
 
 URGENCY = (
-    *(State.LOST, State.SILENT, State.MOVING, State.DWELL, State.STORING, State.UNKNOWN),
-    *(State.NO_CURRENT, State.STOPPED, State.IDLE),
+    *(
+        ReadoutState.LOST,
+        ReadoutState.SILENT,
+        ReadoutState.MOVING,
+        ReadoutState.DWELL,
+        ReadoutState.STORING,
+        ReadoutState.UNKNOWN,
+    ),
+    *(ReadoutState.NO_CURRENT, ReadoutState.STOPPED, ReadoutState.IDLE),
 )
 """The states, the worst first."""
-AT_REST = (State.NO_CURRENT, State.STOPPED, State.IDLE)
+AT_REST = (ReadoutState.NO_CURRENT, ReadoutState.STOPPED, ReadoutState.IDLE)
 ROOMY, NARROW = 100, 80
 """Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
 BETWEEN = 2
 """Blank cells between the last column and what fills the row."""
-WIDE, LEAST = 110, 16
+WIDE_FROM, LEAST_ROOM = 110, 16
 """Least width of the page, and least rows below the list, with the chosen drive there."""
-HEAD, FEWEST = 6, 8
+HEAD_ROWS, FEWEST = 6, 8
 """The rows of the page that are neither, and the least rows of the list."""
 
 
-class Place(NamedTuple):
+class DriveOnLine(NamedTuple):
     """A drive and its line."""
 
     bus: str
@@ -63,9 +70,9 @@ class Place(NamedTuple):
             return alarm, "error"
         if self.glance.unreferenced:
             return NOT_REFERENCED, "strong"
-        released = [each.axis for each in self.glance.readout.others.values() if each.no_current]
+        released = [readout.axis for readout in self.glance.readout.others.values() if readout.no_current]
         if released:
-            return f"{', '.join(released)}: {State.NO_CURRENT.word}", "strong"
+            return f"{', '.join(released)}: {ReadoutState.NO_CURRENT.word}", "strong"
         if program := program_words(self.glance.readout, now):
             return program, "dim" if self.glance.readout.program_aged(now) else "motion"
         return self.glance.product, "dim"
@@ -81,19 +88,19 @@ class Place(NamedTuple):
         return self.glance.state() in URGENCY[:2] or bool(self.alarm())
 
 
-def worst_first(view: View, filtered: str) -> list[Place]:
+def worst_first(view: View, filtered: str) -> list[DriveOnLine]:
     """The drives of all lines whose row contains each word of the text.
 
     A single letter is looked for at the beginning of names only: nearly every row has one in its state or its product.
     """
     buses = view.session.tabs.shown
-    places = [Place(bus.name, each) for bus in buses for each in glances_of(view.session, view.model, bus)]
+    places = [DriveOnLine(bus.name, glance) for bus in buses for glance in glances_of(view.session, view.model, bus)]
     wanted = filtered.casefold().split()
-    found = [place for place in places if all(_has(place, word, view.now) for word in wanted)]
-    return sorted(found, key=lambda place: place.urgency)
+    matching = [place for place in places if all(_has(place, word, view.now) for word in wanted)]
+    return sorted(matching, key=lambda place: place.urgency)
 
 
-def _has(place: Place, word: str, now: float) -> bool:
+def _has(place: DriveOnLine, word: str, now: float) -> bool:
     if len(word) == 1 and word.isalnum():
         return any(name.startswith(word) for name in place.name.casefold().replace(":", " ").split())
     sign, _ = place.glance.sign(now)
@@ -105,7 +112,7 @@ class DriveColumn(NamedTuple):
 
     head: str
     cells: int
-    span: Callable[[Place, float, bool, int], Span]
+    span: Callable[[DriveOnLine, float, bool, int], Span]
     """What it shows of a drive, now, whether it is chosen, in so many cells."""
     right: bool = False
     gap: int = 0
@@ -123,26 +130,26 @@ class DriveColumn(NamedTuple):
         return f"{text:>{max(0, cells)}}" if self.right else fit(text, cells)
 
 
-def _position(place: Place, now: float, chosen: bool, cells: int) -> Span:
+def _position(place: DriveOnLine, now: float, chosen: bool, cells: int) -> Span:
     position, _, role = place.glance.values(now)
     return position, role
 
 
-def _velocity(place: Place, now: float, chosen: bool, cells: int) -> Span:
+def _velocity(place: DriveOnLine, now: float, chosen: bool, cells: int) -> Span:
     _, velocity, role = place.glance.values(now)
     return f" {velocity}", role
 
 
-def _last_seconds(place: Place, now: float, chosen: bool, cells: int) -> Span:
+def _last_seconds(place: DriveOnLine, now: float, chosen: bool, cells: int) -> Span:
     role = place.glance.values(now)[2]
     return spark(place.glance.readout, now, cells), "dim" if role == "dim" else "accent"
 
 
-def _state(place: Place, now: float, chosen: bool, cells: int) -> Span:
+def _state(place: DriveOnLine, now: float, chosen: bool, cells: int) -> Span:
     return short_words(place.glance, place.glance.readout, now), place.glance.sign(now)[1]
 
 
-def _name(place: Place, now: float, chosen: bool, cells: int) -> Span:
+def _name(place: DriveOnLine, now: float, chosen: bool, cells: int) -> Span:
     return visible(place.name), "accent" if chosen else "text"
 
 
@@ -157,10 +164,10 @@ COLUMNS = (
 
 
 def _columns(width: int) -> list[DriveColumn]:
-    return [each for each in COLUMNS if width >= each.least]
+    return [column for column in COLUMNS if width >= column.least]
 
 
-def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
+def drive_row(place: DriveOnLine, now: float, width: int, chosen: bool) -> Row:
     """The columns of a drive, and what matters most besides these."""
     row: list[Span] = [("▸" if chosen else " ", "accent")]
     beyond, columns = 0, _columns(width)
@@ -179,7 +186,7 @@ def columns_row(width: int) -> Row:
     return ((f" {''.join(heads)}".rstrip(), "dim"),)
 
 
-def summary(places: Sequence[Place]) -> str:
+def summary(places: Sequence[DriveOnLine]) -> str:
     """`1 error · 2 moving · 1 silent`, the worst first. A drive at rest with an error is counted as that alone."""
     errors = sum(bool(place.trouble) for place in places)
     states = [(place.glance.state(), bool(place.trouble)) for place in places]
@@ -198,7 +205,7 @@ class AllDrives(ListPage):
     PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr", "chosen": 0}
     FIELD, LIST = "filter", "drives"
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self._chosen: tuple[str, str] | None = None
         """The drive that a person chose; None: the worst one is chosen."""
@@ -213,8 +220,8 @@ class AllDrives(ListPage):
         now, width = view.now, self.size.width
         part = self.lines("chosen")
         drives = sum(len(bus.drives) for bus in view.session.tabs.shown)
-        room = self.size.height - HEAD - max(FEWEST, drives)
-        room = room if width >= WIDE and room >= LEAST else 0
+        room = self.size.height - HEAD_ROWS - max(FEWEST, drives)
+        room = room if width >= WIDE_FROM and room >= LEAST_ROOM else 0
         part.styles.height = room
         part.put(self._chosen_rows(view, at, width, room) if room and self._places else [])
         below = self.put_rows(self._places, at, lambda place, chosen: drive_row(place, now, width, chosen), [_NOTHING])

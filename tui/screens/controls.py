@@ -34,8 +34,8 @@ from multidrop.dialects.controls import (
 )
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.readout import READ, Readout, State
-from multidrop.tui.screens.page import Host, SendingPage
+from multidrop.tui.readout import READ, Readout, ReadoutState
+from multidrop.tui.screens.page import PageHost, SendingPage
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
@@ -61,7 +61,7 @@ class Jog:
         if not idle:
             self._busy = now
 
-    def allows(self, readout: Readout, axis: Readout, state: State, now: float, *, idle: bool) -> bool:
+    def allows(self, readout: Readout, axis: Readout, state: ReadoutState, now: float, *, idle: bool) -> bool:
         """True if a press at this time counts; one that does not is dropped."""
         self.look(now, idle=idle)
         repeated = now - self._pressed < REPETITION
@@ -73,11 +73,11 @@ class Jog:
         self.dropped, self._busy = 0, now
         return True
 
-    def obstacle(self, readout: Readout, axis: Readout, state: State, now: float) -> str:
+    def obstacle(self, readout: Readout, axis: Readout, state: ReadoutState, now: float) -> str:
         """The reason for which no move may start now; empty: it may."""
         if state not in READ or axis.last is None:
-            return f"it is {'not read yet' if state is State.UNKNOWN else state.word}"
-        if state is State.MOVING or axis.last.velocity != 0:
+            return f"it is {'not read yet' if state is ReadoutState.UNKNOWN else state.word}"
+        if state is ReadoutState.MOVING or axis.last.velocity != 0:
             return "it moves"
         if self._busy == now:
             return "a line is on its way"
@@ -119,14 +119,14 @@ class ControlsPage(SendingPage):
 
     SHEET = "controls"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"
+        Binding(letter, "drop", show=False) for letter in ascii_letters + digits if letter not in "lmbhed"
     ]
     WANTS = frozenset({"motion", "conditions"})
     STOPS = frozenset({"space"})
     PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
     FIELD = "number"
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self.step = FIRST_STEP
         self._jog = Jog()
@@ -244,10 +244,10 @@ class ControlsPage(SendingPage):
 
     def action_step(self, by: int) -> None:
         self.begun = None
-        larger = [each for each in STEPS if each > self.step]
-        smaller = [each for each in STEPS if each < self.step]
-        found = larger[:1] if by > 0 else smaller[-1:]
-        self.step = found[0] if found else self.step
+        larger = [step for step in STEPS if step > self.step]
+        smaller = [step for step in STEPS if step < self.step]
+        steps = larger[:1] if by > 0 else smaller[-1:]
+        self.step = steps[0] if steps else self.step
 
     def action_axis(self) -> None:
         self.begun = None

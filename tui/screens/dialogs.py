@@ -21,7 +21,7 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from multidrop.base.text import visible
-from multidrop.shell.channel import Field as Wanted
+from multidrop.shell.channel import AskedValue
 from multidrop.tui.key_table import Keyed, hint
 from multidrop.tui.widgets.bars import StopSign
 
@@ -32,7 +32,7 @@ REFUSED = Binding(",".join(f"f{number}" for number in range(2, 13)), "refuse", s
 """Function keys, which play no macro in front of a question."""
 
 
-class Field(Input):
+class InputField(Input):
     """A line to type in; Enter hands on its text."""
 
     def __init__(
@@ -57,11 +57,13 @@ class Field(Input):
             await done
 
 
-class Options(OptionList):
+class ChoiceList(OptionList):
     """A list to choose from; Enter or a click hands on the number of the option."""
 
     def __init__(self, options: Sequence[str | Text], taken: Callable[[int], None], *, id: str | None = None) -> None:
-        super().__init__(*(Option(Text(visible(each)) if isinstance(each, str) else each) for each in options), id=id)
+        super().__init__(
+            *(Option(Text(visible(option)) if isinstance(option, str) else option) for option in options), id=id
+        )
         self._taken = taken
 
     def watch_scroll_y(self, old: float, new: float) -> None:
@@ -145,11 +147,11 @@ class Ask(Dialog[str]):
     def compose(self) -> ComposeResult:
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
-            yield Field(self._entered, self.value)
+            yield InputField(self._entered, self.value)
             yield Hint(self.hint)
 
     def begin(self) -> None:
-        self.set_focus(self.query_one(Field))
+        self.set_focus(self.query_one(InputField))
 
     def _entered(self, text: str) -> None:
         self.dismiss(text or None)
@@ -174,16 +176,16 @@ class Confirm(Dialog[str]):
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
-            yield Options([text for _, text in self.answers], self._taken)
+            yield ChoiceList([text for _, text in self.answers], self._taken)
             yield Hint(hint("answers"))
 
     def begin(self) -> None:
-        self.query_one(Options).highlighted = 0
-        self.set_focus(self.query_one(Options))
+        self.query_one(ChoiceList).highlighted = 0
+        self.set_focus(self.query_one(ChoiceList))
 
     def action_begin(self, letter: str) -> None:
         """Highlight the next answer whose key or text begins with a letter; none where no answer does."""
-        options = self.query_one(Options)
+        options = self.query_one(ChoiceList)
         begun = [n for n, words in enumerate(self.answers) if any(word.lower().startswith(letter) for word in words)]
         at = -1 if options.highlighted is None else options.highlighted
         options.highlighted = next((n for n in begun if n > at), begun[0] if begun else None)
@@ -206,7 +208,7 @@ class GoOn(Dialog[bool]):
     def compose(self) -> ComposeResult:
         with Vertical(classes="box"):
             yield Static(visible(self.question), classes="title", markup=False)
-            yield Options(["No, send nothing", "Yes, go on"], self._taken)
+            yield ChoiceList(["No, send nothing", "Yes, go on"], self._taken)
             yield Hint(hint("question", escape="no"))
 
     def on_resize(self) -> None:
@@ -219,8 +221,8 @@ class GoOn(Dialog[bool]):
             self._room(box.outer_size.height + 1)
 
     def begin(self) -> None:
-        self.query_one(Options).highlighted = 0
-        self.set_focus(self.query_one(Options))
+        self.query_one(ChoiceList).highlighted = 0
+        self.set_focus(self.query_one(ChoiceList))
 
     def _taken(self, number: int) -> None:
         self.dismiss(number == 1)
@@ -242,7 +244,7 @@ class Match(NamedTuple):
     text: Text
 
 
-class Search(Dialog[str]):
+class SearchDialog(Dialog[str]):
     """Type to narrow a list; returns the key of the chosen result. The key that opened it steps to the next one."""
 
     SHEET = "list"
@@ -257,37 +259,37 @@ class Search(Dialog[str]):
     def compose(self) -> ComposeResult:
         with Vertical(classes="box wide"):
             yield Static(self.heading, classes="title", markup=False)
-            yield Field(self._entered, edited=self._narrow)
-            options = Options((), self._taken)
+            yield InputField(self._entered, edited=self._narrow)
+            options = ChoiceList((), self._taken)
             options.can_focus = False
             yield options
             yield Hint(self.hint)
 
     def begin(self) -> None:
-        self.set_focus(self.query_one(Field))
+        self.set_focus(self.query_one(InputField))
         self._narrow("")
 
     def _narrow(self, text: str) -> None:
         self.found = self._find(text)
-        options = self.query_one(Options)
+        options = self.query_one(ChoiceList)
         options.clear_options()
         options.add_options([Option(match.text) for match in self.found] or [Option("nothing matches", disabled=True)])
         options.highlighted = 0 if self.found else None
         options.call_after_refresh(options.tell_below)
 
     def action_step(self, by: int) -> None:
-        options = self.query_one(Options)
+        options = self.query_one(ChoiceList)
         if self.found and options.highlighted is not None:
             options.highlighted = min(max(options.highlighted + by, 0), len(self.found) - 1)
 
     def _entered(self, text: str) -> None:
-        self.query_one(Options).action_select()
+        self.query_one(ChoiceList).action_select()
 
     def _taken(self, number: int) -> None:
         self.dismiss(self.found[number].key)
 
 
-class Offer(NamedTuple):
+class ListedChoice(NamedTuple):
     """One of a list: its key, its text, and the words by which it is found; the words of the text if none are given."""
 
     key: str
@@ -295,10 +297,10 @@ class Offer(NamedTuple):
     words: str = ""
 
 
-class Choose(Search):
+class Choose(SearchDialog):
     """Choose one of a list, which narrows as its words are typed; returns its key. `current` is highlighted first."""
 
-    def __init__(self, title: str, offers: Sequence[Offer], current: str = "") -> None:
+    def __init__(self, title: str, offers: Sequence[ListedChoice], current: str = "") -> None:
         super().__init__(title, lambda typed: offers_like(offers, typed))
         self._current = current
 
@@ -306,26 +308,26 @@ class Choose(Search):
         super()._narrow(text)
         keys = [match.key for match in self.found]
         if not text.strip() and self._current in keys:
-            self.query_one(Options).highlighted = keys.index(self._current)
+            self.query_one(ChoiceList).highlighted = keys.index(self._current)
 
 
-def offers_like(offers: Sequence[Offer], typed: str) -> list[Match]:
+def offers_like(offers: Sequence[ListedChoice], typed: str) -> list[Match]:
     """The offers that have a word for each typed one that begins with it; first those that have just these words.
 
     A word never matches inside another one: the `l` of a product would take any drive.
     """
     wanted = typed.replace(":", " ").split()
-    found: list[tuple[bool, bool, int]] = []
+    ranked: list[tuple[bool, bool, int]] = []
     for number, offer in enumerate(offers):
         words = (offer.words or offer.text).replace(":", " ").split()
         lower = [word.casefold() for word in words]
         if all(any(word.startswith(each.casefold()) for word in lower) for each in wanted):
             same = all(each in words for each in wanted)
-            found.append((not same, not all(each.casefold() in lower for each in wanted), number))
-    return [Match(offers[number].key, Text(visible(offers[number].text))) for *_, number in sorted(found)]
+            ranked.append((not same, not all(each.casefold() in lower for each in wanted), number))
+    return [Match(offers[number].key, Text(visible(offers[number].text))) for *_, number in sorted(ranked)]
 
 
-LEAST = (60, 15)
+LEAST_SIZE = (60, 15)
 """Smallest width and height of the main screen."""
 
 
@@ -337,7 +339,7 @@ class TooSmall(Over[None]):
 
     def on_resize(self) -> None:
         width, height = self.app.size
-        need = f"{LEAST[0]}x{LEAST[1]}"
+        need = f"{LEAST_SIZE[0]}x{LEAST_SIZE[1]}"
         text = f"too small: {need} needed, this is {width}x{height}; ^X still stops"
         self.query_one("#too-small", Static).update(text)
 
@@ -345,13 +347,13 @@ class TooSmall(Over[None]):
 NEEDED = "a value is needed"
 
 
-class Form(Dialog[dict[str, str]]):
+class FormDialog(Dialog[dict[str, str]]):
     """Asks for values; returns them by name. Enter takes a value and goes to the next, at the end it takes all."""
 
     SHEET = "form"
     BINDINGS: ClassVar[list[BindingType]] = [REFUSED]
 
-    def __init__(self, title: str, wanted: Sequence[Wanted]) -> None:
+    def __init__(self, title: str, wanted: Sequence[AskedValue]) -> None:
         super().__init__()
         self.heading, self.wanted = title, list(wanted)
         self._at = 0
@@ -361,18 +363,18 @@ class Form(Dialog[dict[str, str]]):
         with Vertical(classes="box wide"):
             yield Static(visible(self.heading), classes="title", markup=False)
             with VerticalScroll(classes="form", can_focus=False):
-                for number, each in enumerate(self.wanted):
-                    yield Static(f"{each.name}: {visible(each.valid)}", classes="about", markup=False)
-                    yield Field(self._entered, each.default or "", id=f"value-{number}")
+                for number, field in enumerate(self.wanted):
+                    yield Static(f"{field.name}: {visible(field.valid)}", classes="about", markup=False)
+                    yield InputField(self._entered, field.default or "", id=f"value-{number}")
             yield Static("", id="wrong", markup=False)
             yield Hint(hint("form"))
 
     def begin(self) -> None:
-        needed = [number for number, each in enumerate(self.wanted) if each.default is None]
+        needed = [number for number, field in enumerate(self.wanted) if field.default is None]
         self._go(needed[0] if needed else 0)
 
-    def _field(self, number: int) -> Field:
-        return self.query_one(f"#value-{number}", Field)
+    def _field(self, number: int) -> InputField:
+        return self.query_one(f"#value-{number}", InputField)
 
     def _go(self, number: int) -> None:
         self._at = number
@@ -394,7 +396,7 @@ class Form(Dialog[dict[str, str]]):
             if self._is_wrong(number):
                 self._go(number)
                 return
-        self.dismiss({each.name: self._text(number) for number, each in enumerate(self.wanted)})
+        self.dismiss({field.name: self._text(number) for number, field in enumerate(self.wanted)})
 
     def _text(self, number: int) -> str:
         """The value as typed, else the default."""
@@ -402,7 +404,7 @@ class Form(Dialog[dict[str, str]]):
 
     def _is_wrong(self, number: int) -> bool:
         """Show what is wrong with a value; whether anything is."""
-        each, text = self.wanted[number], self._text(number)
-        problem = NEEDED if not text and each.default is None else each.problem(text)
-        self.query_one("#wrong", Static).update(f"{each.name}: {problem}" if problem == NEEDED else problem)
+        field, text = self.wanted[number], self._text(number)
+        problem = NEEDED if not text and field.default is None else field.problem(text)
+        self.query_one("#wrong", Static).update(f"{field.name}: {problem}" if problem == NEEDED else problem)
         return bool(problem)

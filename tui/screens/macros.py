@@ -11,7 +11,7 @@ from multidrop.macros import Macro, MacroStore
 from multidrop.shell.playing import Playing
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
-from multidrop.tui.screens.page import Host, ListPage, start
+from multidrop.tui.screens.page import ListPage, PageHost, start
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, in_view, spread
@@ -27,7 +27,7 @@ NOTHING: tuple[Row, ...] = (
 _NONE: tuple[Row, ...] = (((" no macro has that", "dim"),),)
 
 
-class Listed(NamedTuple):
+class ListedMacro(NamedTuple):
     """A macro in the list; without a `macro`, why its file cannot be read."""
 
     name: str
@@ -47,24 +47,24 @@ class Listed(NamedTuple):
         return f"{self.name} {self.place} {self.macro.note if self.macro is not None else ''}".casefold()
 
 
-def listed(store: MacroStore) -> list[Listed]:
+def listed(store: MacroStore) -> list[ListedMacro]:
     """Every macro. For a thread."""
     try:
         return [_listed(store, name) for name in store.names()]
     except Diagnostic as problem:
-        return [Listed("", None, str(problem))]
+        return [ListedMacro("", None, str(problem))]
 
 
-def _listed(store: MacroStore, name: str) -> Listed:
+def _listed(store: MacroStore, name: str) -> ListedMacro:
     try:
         macro = store.load(name)
         macro.values  # noqa: B018  # a value that is declared wrong is a trouble of the file
-        return Listed(name, macro)
+        return ListedMacro(name, macro)
     except Diagnostic as problem:
-        return Listed(name, None, str(problem))
+        return ListedMacro(name, None, str(problem))
 
 
-def macro_row(each: Listed, playing: Playing | None, width: int, chosen: bool) -> Row:
+def macro_row(each: ListedMacro, playing: Playing | None, width: int, chosen: bool) -> Row:
     """Name, key, step where it plays, length and values, note."""
     head: Row = (
         ("▸" if chosen else " ", "accent"),
@@ -80,7 +80,7 @@ def macro_row(each: Listed, playing: Playing | None, width: int, chosen: bool) -
     return (*head, (fit(about, room), "dim"))
 
 
-def step_rows(each: Listed, playing: Playing | None, width: int, height: int) -> list[Row]:
+def step_rows(each: ListedMacro, playing: Playing | None, width: int, height: int) -> list[Row]:
     """The lines of a macro around the one that plays."""
     if each.macro is None or height < 1:
         return []
@@ -107,10 +107,10 @@ class MacrosPage(ListPage):
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "filter": None, "macros": "1fr", "steps": None, "news": NEWS + 1}
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
-        self._macros: list[Listed] = []
-        self._shown: list[Listed] = []
+        self._macros: list[ListedMacro] = []
+        self._shown: list[ListedMacro] = []
         """Those that have what was typed."""
         self._at = 0
         self._painted = False
@@ -158,12 +158,12 @@ class MacrosPage(ListPage):
             self._macros = await asyncio.to_thread(listed, self.host.session.macros)
             self._known = True
             self.edited(self.words)
-            names = [each.name for each in self._shown]
+            names = [macro.name for macro in self._shown]
             self._at = names.index(name) if name in names else self._at
         finally:
             self._reading = False
 
-    def _chosen(self) -> Listed | None:
+    def _chosen(self) -> ListedMacro | None:
         return self._shown[self._at] if self._at < len(self._shown) else None
 
     # Keys
@@ -171,10 +171,10 @@ class MacrosPage(ListPage):
     def edited(self, text: str) -> None:
         """Keep the macros that have every typed word in name, key or note; one with just that name is chosen."""
         words, before = text.casefold().split(), self._shown
-        self._shown = [each for each in self._macros if all(word in each.words for word in words)]
+        self._shown = [macro for macro in self._macros if all(word in macro.words for word in words)]
         if self._shown != before:
             self._painted = False
-            named = [n for n, each in enumerate(self._shown) if each.name == text]
+            named = [n for n, macro in enumerate(self._shown) if macro.name == text]
             self._at = named[0] if named else 0 if words else self._at
         self._at = min(self._at, max(0, len(self._shown) - 1))
 

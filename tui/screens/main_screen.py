@@ -14,18 +14,18 @@ from textual.geometry import Size
 
 from multidrop.shell.roles import Filter
 from multidrop.tui.key_table import NONE
-from multidrop.tui.panels.table import CONDITIONS, LAYOUTS, MOTION, PANELS, Place, Shown, fitting, side_width
+from multidrop.tui.panels.table import CONDITIONS, LAYOUTS, MOTION, PANELS, Place, ShownPanels, fitting, side_width
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
 from multidrop.tui.text import fit, shorter
 from multidrop.tui.widgets.bars import Banner, rule_row
-from multidrop.tui.widgets.entry import Complete, Draft, Entry, Typed
+from multidrop.tui.widgets.entry import Complete, Entry, LineDraft, Typed
 from multidrop.tui.widgets.lines import Lines, Roles, Row, width_of
-from multidrop.tui.widgets.search_bar import Reader
+from multidrop.tui.widgets.search_bar import SearchBar
 from multidrop.tui.widgets.transcript import Transcript
 
 
-class Beside(Vertical):
+class SideTranscript(Vertical):
     """A heading and a transcript that copies what another one takes in. Hidden while it shows nothing."""
 
     def __init__(self, clock: Callable[[float], str], changed: Callable[[], None]) -> None:
@@ -73,7 +73,7 @@ class Beside(Vertical):
             self._heading.put([row])
 
 
-WIDE = (110, 24)
+WIDE_FROM = (110, 24)
 """Smallest width and height with a column of panels."""
 TALL = 32
 """Smallest height with panels below the transcript, too."""
@@ -95,9 +95,9 @@ class MainScreen(Framed):
     SHEET = "main"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(
-            f"{NONE}panel-{each.name}", f"act.panel('{each.name}')", f"panel: {each.about}", id=f"panel-{each.name}"
+            f"{NONE}panel-{panel.name}", f"act.panel('{panel.name}')", f"panel: {panel.about}", id=f"panel-{panel.name}"
         )
-        for each in PANELS
+        for panel in PANELS
     ]
 
     def __init__(
@@ -110,20 +110,20 @@ class MainScreen(Framed):
     ) -> None:
         super().__init__()
         self._clock = clock
-        self._drafts: dict[str, Draft] = {}
+        self._drafts: dict[str, LineDraft] = {}
         """The lines that are being edited on the pages that are not shown."""
         self.pages: dict[str, Transcript] = {}
         self.current = ""
         self.times = "clock"
         """The form of the times in the transcripts."""
-        self.panels = Shown()
+        self.panels = ShownPanels()
         self._hint = self._first_hint = ""
-        self.reader = Reader(self.take_keys, id="reader")
+        self.reader = SearchBar(self.take_keys, id="reader")
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Lines(id="menu")
         """The list of completions, above the line."""
         self._stack = Vertical(id="pages")
-        self.beside = Beside(clock, self.make_room)
+        self.beside = SideTranscript(clock, self.make_room)
         self._halves = Vertical(self.beside, self._stack, id="halves")
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts |= {name: Lines(id=name) for name in PLAIN}
@@ -155,7 +155,7 @@ class MainScreen(Framed):
 
     @property
     def wide(self) -> bool:
-        return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
+        return self.size.width >= WIDE_FROM[0] and self.size.height >= WIDE_FROM[1]
 
     def columns(self) -> list[tuple[str, list[Place]]]:
         """The parts that hold panels, and the places in each, from top to bottom.

@@ -27,13 +27,13 @@ from multidrop.tui.keymap import FunctionKeys
 from multidrop.tui.outbox import Outbox, ended
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
-from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.dialogs import InputField
 from multidrop.tui.terminal.canvas import FrontCompositor
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.text import at_words
 from multidrop.tui.texts import Texts
 from multidrop.tui.widgets.bars import Banner, Footer, TopLine
-from multidrop.tui.widgets.lines import Lines, Link, Row, Span, T, in_view
+from multidrop.tui.widgets.lines import ActionText, Lines, Row, Span, T, in_view
 
 
 class Framed(Keyed, Screen[None]):
@@ -68,7 +68,7 @@ def show_rows(part: Lines, rows: list[Row]) -> None:
 
 
 @dataclass
-class Host:
+class PageHost:
     """The parts of the app that pages use."""
 
     session: Session
@@ -88,7 +88,7 @@ class Host:
     """What is wrong in the text of a configuration file with this name, as far as only the screen knows it."""
 
 
-class Begun(NamedTuple):
+class PendingLines(NamedTuple):
     """A text that is being typed, or lines that wait for Enter; the stops and the drive when it was begun."""
 
     kind: str
@@ -119,7 +119,7 @@ class Page(Framed, metaclass=AbstractScreen):  # type: ignore[metaclass]
     PARTS: ClassVar[Mapping[str, str | int | None]] = {}
     """The parts that are rows, from top to bottom, with their heights; None: as the style sheet has it."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__()
         self.host = host
         self.trouble = ""
@@ -175,11 +175,11 @@ class AskingPage(Page):
     FIELD: ClassVar[str] = ""
     """The name of the line among the parts."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
-        self.field = Field(self.typed, edited=self.edited, id=self.FIELD or None)
+        self.field = InputField(self.typed, edited=self.edited, id=self.FIELD or None)
         self.said: Span = ("", "dim")
-        self.asked: Begun | None = None
+        self.asked: PendingLines | None = None
         """What the line to type in is shown for."""
 
     def content(self) -> ComposeResult:
@@ -215,8 +215,8 @@ class AskingPage(Page):
     def say(self, text: str, role: str = "strong") -> None:
         self.said = (text, role)
 
-    def begin(self, kind: str, name: str = "", lines: tuple[str, ...] = ()) -> Begun:
-        return Begun(kind, self.host.session.stops, self.host.session.place, name, lines)
+    def begin(self, kind: str, name: str = "", lines: tuple[str, ...] = ()) -> PendingLines:
+        return PendingLines(kind, self.host.session.stops, self.host.session.place, name, lines)
 
 
 OVERTAKEN = "nothing was sent: a stop or another drive came in between"
@@ -225,9 +225,9 @@ OVERTAKEN = "nothing was sent: a stop or another drive came in between"
 class SendingPage(AskingPage):
     """A page that shows lines before Enter sends them."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
-        self.begun: Begun | None = None
+        self.begun: PendingLines | None = None
         """The lines that Enter would send."""
         self.painted = False
         """They were shown, and no key waited then that was typed before."""
@@ -236,7 +236,7 @@ class SendingPage(AskingPage):
         """Let Enter send lines, once they were shown."""
         self.begun, self.painted = self.begin(kind, lines=lines), False
 
-    def accepted(self) -> Begun | None:
+    def accepted(self) -> PendingLines | None:
         """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
         begun = self.begun
         if begun is None or not self.painted:
@@ -261,9 +261,9 @@ class ListPage(AskingPage):
     LIST: ClassVar[str] = ""
     """The name of the rows among the parts."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
-        self.field = Field(self.typed, edited=lambda text: self.edited(text.removeprefix("/")), id=self.FIELD)
+        self.field = InputField(self.typed, edited=lambda text: self.edited(text.removeprefix("/")), id=self.FIELD)
 
     def content(self) -> ComposeResult:
         """Make the parts; the line that narrows the rows is always there."""
@@ -299,7 +299,7 @@ class ListPage(AskingPage):
         """Show the rows around the chosen one; return how many are below them."""
         part = self.lines(self.LIST)
         shown = in_view(items, at, part.size.height if height is None else height)
-        rows = [_linked(row(each, number == at), number) for number, each in shown]
+        rows = [_linked(row(item, number == at), number) for number, item in shown]
         part.put(rows or nothing)
         below = len(items) - shown[-1][0] - 1 if shown else 0
         return f"▼ {below} below   " if below else "", "strong"
@@ -326,7 +326,7 @@ class ListPage(AskingPage):
 
 def _linked(row: Row, number: int) -> Row:
     text, role = row[0]
-    return (Link(text, f"screen.clicked({number})"), role), *row[1:]
+    return (ActionText(text, f"screen.clicked({number})"), role), *row[1:]
 
 
 class PageEntry(NamedTuple):
@@ -340,8 +340,8 @@ class PageEntry(NamedTuple):
     """Module and class in `tui.screens`."""
 
     def page(self) -> type[Page]:
-        found: type[Page] = imported(f"multidrop.tui.screens.{self.place}")
-        return found
+        kind: type[Page] = imported(f"multidrop.tui.screens.{self.place}")
+        return kind
 
 
 PAGES: tuple[PageEntry, ...] = (

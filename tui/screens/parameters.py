@@ -29,7 +29,7 @@ from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.page import Host, ListPage, SendingPage
+from multidrop.tui.screens.page import ListPage, PageHost, SendingPage
 from multidrop.tui.screens.settings_file import FileColumn
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
@@ -45,7 +45,7 @@ TOLD = ("range", "value", "values", "note")
 
 
 @dataclass(frozen=True)
-class Setting:
+class ShownSetting:
     """One setting: its value here and what it is compared with, each as text."""
 
     reading: Reading
@@ -56,24 +56,26 @@ class Setting:
     meaning: str = ""
 
 
-def rows(found: Readings, other: Mapping[str, Value] | None, meanings: Mapping[str, str]) -> list[Setting]:
+def rows(found: Readings, other: Mapping[str, Value] | None, meanings: Mapping[str, str]) -> list[ShownSetting]:
     """A row for each setting. `other`: the values to compare with."""
     made = []
-    for each in found.readings:
-        there = None if other is None else other.get(each.name)
+    for reading in found.readings:
+        there = None if other is None else other.get(reading.name)
         compared = "" if there is None else files.shown(there)
-        differs = there is not None and not same(each.value, there)
-        made.append(Setting(each, files.shown(each.value), compared, differs, meanings.get(each.name, "")))
+        differs = there is not None and not same(reading.value, there)
+        made.append(
+            ShownSetting(reading, files.shown(reading.value), compared, differs, meanings.get(reading.name, ""))
+        )
     return made
 
 
-def found_in(table: Sequence[Setting], words: str, *, differing: bool = False) -> list[Setting]:
+def found_in(table: Sequence[ShownSetting], words: str, *, differing: bool = False) -> list[ShownSetting]:
     """The rows that contain every word: names, sections, values, meanings."""
     wanted = words.casefold().split()
 
-    def contains(row: Setting) -> bool:
+    def contains(row: ShownSetting) -> bool:
         text = f"{row.reading.name} {row.reading.section} {row.value} {row.reading.unit} {row.meaning}".casefold()
-        return all(each in text for each in wanted)
+        return all(word in text for word in wanted)
 
     chosen = [row for row in table if contains(row) and (row.differs or not differing)]
     return sorted(chosen, key=lambda row: row.reading.name.casefold() != words.strip().casefold())
@@ -82,44 +84,44 @@ def found_in(table: Sequence[Setting], words: str, *, differing: bool = False) -
 def meanings_of(found: Readings, language: Language, product: str) -> dict[str, str]:
     """The first line of help on each setting, without its name."""
     made = {}
-    for each in found.readings:
-        for word in (each.name, each.name.rstrip("0123456789")):
+    for reading in found.readings:
+        for word in (reading.name, reading.name.rstrip("0123456789")):
             try:
                 first = language.describe(word, product)[0]
             except Diagnostic:
                 continue
-            made[each.name] = re.sub(r" \((?:variable|flag)\)$", "", first.partition(": ")[2] or first)
+            made[reading.name] = re.sub(r" \((?:variable|flag)\)$", "", first.partition(": ")[2] or first)
             break
     return made
 
 
 def parsed(text: str) -> Value:
     """Read a typed value: a number, a text, or the fields of a set-up with commas. Raises Diagnostic."""
-    fields = [each.strip() for each in text.strip().strip("[]").split(",")]
+    fields = [part.strip() for part in text.strip().strip("[]").split(",")]
     if not all(fields):
         raise Diagnostic("a value is missing", text, "such as 600000, or 1,1,0 for a set-up")
     values: list[Scalar] = []
-    for each in fields:
-        if _NUMBER.fullmatch(each):
-            values.append(int(each))
-        elif _FRACTION.fullmatch(each):
-            values.append(float(each))
-        elif each.isascii() and each.isprintable():
-            values.append(each.strip('"'))
+    for typed in fields:
+        if _NUMBER.fullmatch(typed):
+            values.append(int(typed))
+        elif _FRACTION.fullmatch(typed):
+            values.append(float(typed))
+        elif typed.isascii() and typed.isprintable():
+            values.append(typed.strip('"'))
         else:
-            raise Diagnostic("not a value", each, "a number, or text in plain ASCII")
+            raise Diagnostic("not a value", typed, "a number, or text in plain ASCII")
     return values[0] if len(values) == 1 else tuple(values)
 
 
 @dataclass(frozen=True)
-class Edit:
+class SettingEdit:
     """The lines that change one setting, and what a person must know before they are sent."""
 
     lines: tuple[str, ...]
     warning: str = ""
 
 
-def edit(parameters: Parameters, present: Readings, name: str, value: Value) -> Edit:
+def edit(parameters: Parameters, present: Readings, name: str, value: Value) -> SettingEdit:
     """Plan the lines that set one value. Raises Diagnostic for a value that the drive refuses."""
     made = parameters.plan(present, {name: value}, ORDINARY)
     warning = "; ".join(reason for _, reason in made.withheld)
@@ -129,7 +131,7 @@ def edit(parameters: Parameters, present: Readings, name: str, value: Value) -> 
         raise Diagnostic("; ".join(reason for _, reason in made.impossible), name)
     if not made.changes:
         raise Diagnostic(f"it is {files.shown(value)} already", name)
-    return Edit(tuple(change.text for change in made.changes), "; ".join(filter(None, (warning, *made.remarks))))
+    return SettingEdit(tuple(change.text for change in made.changes), "; ".join(filter(None, (warning, *made.remarks))))
 
 
 @dataclass
@@ -141,7 +143,7 @@ class SettingsTable:
     other: tuple[str, dict[str, Value]] | None = None
     """The other side of a comparison: its name, and its values."""
     at: int = 0
-    shown: list[Setting] = field(default_factory=list)
+    shown: list[ShownSetting] = field(default_factory=list)
     found: Readings | None = None
     _drive: Drive | None = None
     _made_of: tuple[object, ...] = ()
@@ -161,7 +163,7 @@ class SettingsTable:
         self.at = min(max(self.at, 0), max(0, len(self.shown) - 1))
 
     @property
-    def chosen(self) -> Setting | None:
+    def chosen(self) -> ShownSetting | None:
         """The chosen setting of what the table is made of now: an Enter may follow in the same read."""
         self.make(self.found, self._drive)
         return self.shown[self.at] if self.shown else None
@@ -197,12 +199,15 @@ class SettingsTable:
         if row is None or drive is None:
             return ""
         try:
-            lines = [" ".join(each.split()) for each in drive.family.language.describe(row.reading.name, drive.product)]
-            return "   ".join([*lines[:2], *(each for each in lines[2:] if each.split(" ")[0] in TOLD)])
+            lines = [
+                " ".join(paragraph.split())
+                for paragraph in drive.family.language.describe(row.reading.name, drive.product)
+            ]
+            return "   ".join([*lines[:2], *(line for line in lines[2:] if line.split(" ")[0] in TOLD)])
         except Diagnostic:
             return f"{row.reading.name} {row.meaning}"
 
-    def row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str] | None) -> Row:
+    def row(self, row: ShownSetting, width: int, chosen: bool, units: Callable[[str, Value], str] | None) -> Row:
         there: list[Span] = []
         if self.other is not None:
             there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
@@ -245,7 +250,7 @@ class ParametersPage(ListPage, SendingPage):
     PARTS = {"heading": None, "asked": None, "columns": None, "table": "1fr", "meaning": None, "said": None}
     FIELD, LIST = "asked", "table"
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self._table = SettingsTable()
         self._file_column = FileColumn(lambda: self._table, self.say, self.run_worker)
@@ -270,8 +275,8 @@ class ParametersPage(ListPage, SendingPage):
         if place != self._place:
             self._place, self._table, self._asked_for = place, SettingsTable(), False
             self._close("")
-        begun = [each for each in (self.asked, self.begun) if each is not None]
-        if any(each.stops != view.session.stops for each in begun):
+        begun = [edit for edit in (self.asked, self.begun) if edit is not None]
+        if any(edit.stops != view.session.stops for edit in begun):
             self._close("stopped; nothing was sent")
         if view.model.trouble:
             self.say(f"✗ {view.model.trouble}")
@@ -341,15 +346,17 @@ class ParametersPage(ListPage, SendingPage):
             self._file_column.look()
 
     def action_defaults(self) -> None:
-        found = self._settings()
+        readings = self._settings()
         table = self._table
         if table.other is not None and table.other[0] == "default":
             table.other, table.only_differing = None, False
-        elif found is not None and found.defaults:
-            table.other = ("default", found.defaults)
+        elif readings is not None and readings.defaults:
+            table.other = ("default", readings.defaults)
         else:
             self.say(
-                "the defaults of its settings are not known" if found is not None else "its settings are not read yet"
+                "the defaults of its settings are not known"
+                if readings is not None
+                else "its settings are not read yet"
             )
 
     def action_differing(self) -> None:
@@ -424,17 +431,17 @@ class ParametersPage(ListPage, SendingPage):
     def _drive(self, name: str, text: str) -> None:
         bus, _, address = text.rpartition(":")
         session = self.host.session
-        found = self.host.model.bus(bus or session.selected_bus).readouts.get(address)
-        if found is None or found.settings is None:
+        readout = self.host.model.bus(bus or session.selected_bus).readouts.get(address)
+        if readout is None or readout.settings is None:
             raise Diagnostic("its settings are not read", text, f"/params read {text} reads them")
-        self._table.compare(text, found.settings.values)
+        self._table.compare(text, readout.settings.values)
         self._close("")
 
     def _value(self, name: str, text: str) -> None:
         drive, present = self.host.session.selected, self._settings()
         if drive is None or present is None:
             raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
-        planned: Edit = edit(drive.family.values.parameters, present, name, parsed(text))
+        planned: SettingEdit = edit(drive.family.values.parameters, present, name, parsed(text))
         self._close("")
         self.offer(EDIT, planned.lines)
         warning = f" - {planned.warning}" if planned.warning else ""

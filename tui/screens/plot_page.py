@@ -10,30 +10,30 @@ from math import isfinite
 
 from multidrop.base.errors import Diagnostic
 from multidrop.shell import plot_targets
-from multidrop.shell.plots.batch import Batch, Curve
+from multidrop.shell.plots.batch import Batch, PlottedCurve
 from multidrop.shell.roles import DIFFERENCE
-from multidrop.tui.curves.chart import Look
-from multidrop.tui.curves.trigger import Setting, State
+from multidrop.tui.curves.chart import ChartView
+from multidrop.tui.curves.trigger import TriggerSetting, TriggerState
 from multidrop.tui.panels.plot import columns_of, plot_rows, plot_title
-from multidrop.tui.panels.plotted import PLOTTED, Line, groups, role_of
+from multidrop.tui.panels.plotted import PLOTTED, PlottedLine, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
-from multidrop.tui.screens.page import AskingPage, Host
+from multidrop.tui.screens.page import AskingPage, PageHost
 from multidrop.tui.widgets.lines import Row, Span, width_of
 
 EDGES = {"rise": True, "fall": False}
-USUAL = "20%"
+USUAL_SHARE = "20%"
 """The share of the picture before the edge."""
 FORM = "CURVE rise|fall LEVEL [SHARE%]"
-SHORTEST = 0.001
+SHORTEST_SPAN = 0.001
 """The least time between two cursors, s, of which the frequency is shown."""
 
 
-def _lines(view: View) -> list[Line]:
+def _lines(view: View) -> list[PlottedLine]:
     return [line for group in groups(view) for line in group.lines if not line.twin]
 
 
-def _named(line: Line) -> str:
+def _named(line: PlottedLine) -> str:
     """`a velocity`, `press:b X position`: as a person types it."""
     return f"{line.short} {line.quantity.word}"
 
@@ -42,42 +42,42 @@ def typed_trigger(view: View) -> str:
     """The trigger as it can be typed: that which is set, or one in the middle of a curve that moves."""
     lines, look = _lines(view), view.model.look
     setting = look.trigger.setting
-    found = [line for line in lines if setting is not None and line.quantity == setting.quantity]
-    if found and setting is not None:
-        level, rising, before = found[0].conversion.value(setting.level), setting.rising, f"{setting.before:.0%}"
-        return f"{_named(found[0])} {'rise' if rising == (found[0].conversion.gain > 0) else 'fall'} {level:g} {before}"
+    fits = [line for line in lines if setting is not None and line.quantity == setting.quantity]
+    if fits and setting is not None:
+        level, rising, before = fits[0].conversion.value(setting.level), setting.rising, f"{setting.before:.0%}"
+        return f"{_named(fits[0])} {'rise' if rising == (fits[0].conversion.gain > 0) else 'fall'} {level:g} {before}"
     for line in lines:
         trace = view.model.traces.get(line.quantity)
         seen = [value for _, value in trace.since(trace.count_at(view.now - look.span))] if trace is not None else []
         if seen and max(seen) - min(seen) > 2:
             level = (line.conversion.value(min(seen)) + line.conversion.value(max(seen))) / 2
-            return f"{_named(line)} rise {float(f'{level:.2g}'):.10g} {USUAL}"
-    return f"{_named(lines[0])} rise 100 {USUAL}" if lines else ""
+            return f"{_named(line)} rise {float(f'{level:.2g}'):.10g} {USUAL_SHARE}"
+    return f"{_named(lines[0])} rise 100 {USUAL_SHARE}" if lines else ""
 
 
-def parse_trigger(view: View, text: str) -> Setting:
+def parse_trigger(view: View, text: str) -> TriggerSetting:
     """Parse `CURVE rise|fall LEVEL [SHARE%]`; the level is in the unit that is shown. Raises Diagnostic."""
     words = text.split()
     at = next((n for n, word in enumerate(words) if word.lower() in EDGES), len(words))
     named, edge, numbers = words[:at], words[at : at + 1], words[at + 1 :]
     valid = f"valid: {FORM}, as {typed_trigger(view) or 'a velocity rise 100 20%'}"
     try:
-        level, share = (*map(float, numbers[:1]), float((numbers[1:] or [USUAL])[0].removesuffix("%")) / 100)
+        level, share = (*map(float, numbers[:1]), float((numbers[1:] or [USUAL_SHARE])[0].removesuffix("%")) / 100)
     except ValueError:
         raise Diagnostic(f"no trigger {text!r}", hint=valid) from None
     if not edge or len(numbers) > 2 or not isfinite(level) or not 0 <= share <= 1:
         raise Diagnostic(f"no trigger {text!r}", hint=valid)
     lines = _lines(view)
-    found = [line for line in lines if set(named) <= _names(line)]
-    if len(found) != 1:
-        known = ", ".join(map(_named, found or lines)) or "nothing"
-        what = "several curves are" if found else "no plotted curve is"
+    fits = [line for line in lines if set(named) <= _names(line)]
+    if len(fits) != 1:
+        known = ", ".join(map(_named, fits or lines)) or "nothing"
+        what = "several curves are" if fits else "no plotted curve is"
         raise Diagnostic(f"{what} {' '.join(named) or 'without a name'!r}", hint=f"plotted: {known}")
-    gain, zero = found[0].conversion
-    return Setting(found[0].quantity, (level - zero) / gain, EDGES[edge[0].lower()] == (gain > 0), share)
+    gain, zero = fits[0].conversion
+    return TriggerSetting(fits[0].quantity, (level - zero) / gain, EDGES[edge[0].lower()] == (gain > 0), share)
 
 
-def _names(line: Line) -> set[str]:
+def _names(line: PlottedLine) -> set[str]:
     bus, address, axis, word = line.quantity
     return {bus, address, f"{bus}:{address}", axis, word, *line.name.split()}
 
@@ -85,7 +85,7 @@ def _names(line: Line) -> set[str]:
 def trigger_row(view: View) -> Row:
     """The state of the trigger and its condition; nothing while it is off."""
     trigger = view.model.look.trigger
-    if trigger.state is State.OFF or (setting := trigger.setting) is None:
+    if trigger.state is TriggerState.OFF or (setting := trigger.setting) is None:
         return ()
     once = ", once" if trigger.single else ""
     line = next((each for each in _lines(view) if each.quantity == setting.quantity), None)
@@ -100,18 +100,18 @@ def cursor_rows(view: View, width: int, most: int) -> list[Row]:
     at, other = look.cursor, look.other
     if at is None:
         return []
-    clocks = [f"{view.session.wall(each):%H:%M:%S.%f}"[:-4] for each in (other, at) if each is not None]
+    clocks = [f"{view.session.wall(time):%H:%M:%S.%f}"[:-4] for time in (other, at) if time is not None]
     since = at - (view.now if look.zero is None else look.zero)
     pieces: list[list[Span]] = [[(f" {' to '.join(clocks)} ", "strong"), (f" {since:.2f} s  ", "dim")]]
     if other is not None:
         apart = f"dt {at - other:+.3f} s  "
         pieces[0][1:] = [(f" {apart}", "strong")]
-        if abs(at - other) >= SHORTEST:
+        if abs(at - other) >= SHORTEST_SPAN:
             pieces.append([(f"1/dt {1 / abs(at - other):.4g} Hz  ", "strong")])
     for group in groups(view):
         chart = look.charts.get((group.word, group.key, columns_of(width)))
         for line in group.lines if chart is not None else ():
-            values = [None if chart is None else chart.value_at(line.quantity, each) for each in (other or at, at)]
+            values = [None if chart is None else chart.value_at(line.quantity, time) for time in (other or at, at)]
             texts = ["not known" if value is None else line.text(value) for value in values]
             text = texts[1] if other is None else f"{texts[0]} to {texts[1]}"
             if other is not None and values[0] is not None and values[1] is not None:
@@ -138,17 +138,19 @@ def samples_of(view: View, width: int) -> Batch:
     for group in groups(view):
         for line in group.lines:
             trace = view.model.traces.get(line.quantity)
-            seen = [each for each in trace.since(trace.count_at(begin)) if each[0] < end] if trace is not None else []
+            seen = (
+                [point for point in trace.since(trace.count_at(begin)) if point[0] < end] if trace is not None else []
+            )
             if not seen:
                 continue
             bus, address, axis, word = line.of_drive.quantity
-            curve = Curve(bus, address, axis, word, twin=line.twin or word == DIFFERENCE)
+            curve = PlottedCurve(bus, address, axis, word, twin=line.twin or word == DIFFERENCE)
             batch.labels[bus, address] = view.session.buses[bus].drives[address].label
             batch.curves[curve] = [(at - begin, wall + at - begin, value) for at, value in seen]
             if line.figures.unit and word in PLOTTED and not line.twin:
                 shown = [(*times, line.conversion.value(value)) for *times, value in batch.curves[curve]]
                 batch.curves[curve._replace(unit=line.unit.rstrip("?"))] = [
-                    (one, two, each) for one, two, each in shown
+                    (one, two, point) for one, two, point in shown
                 ]
     if not batch.curves:
         raise Diagnostic("nothing to save", hint="there are no samples in the time that is shown")
@@ -163,12 +165,12 @@ class PlotPage(AskingPage):
     PARTS = {"heading": None, "charts": "1fr", "below": None, "asked": None}
     FIELD = "asked"
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self._columns = 1
 
     @property
-    def _look(self) -> Look:
+    def _look(self) -> ChartView:
         return self.host.model.look
 
     @property
@@ -194,7 +196,7 @@ class PlotPage(AskingPage):
         """The last failure, or how to see what a viewer shows, or what else takes the samples."""
         if self.host.model.trouble:
             return ((f" ✗ {self.host.model.trouble}", "error"),)
-        served = [each for each in view.session.plots if each.desk]
+        served = [plot for plot in view.session.plots if plot.desk]
         if served:
             return (
                 (" at your desk: ", "dim"),
@@ -202,7 +204,7 @@ class PlotPage(AskingPage):
                 ("   c copies it; then: ", "dim"),
                 (served[0].viewer, "strong"),
             )
-        others = [each.shown for each in view.session.plots]
+        others = [plot.shown for plot in view.session.plots]
         return ((f" {others[0]}", "dim"),) if others else ()
 
     def _type(self, line: str) -> None:
@@ -318,17 +320,17 @@ class PlotPage(AskingPage):
             return
         address = list(bus.drives)[number - 1]
         named = list(plotted(self.host.session))
-        mine = [each for each in named if (each.bus, each.address, each.word) == (bus.name, address, "")]
-        texts = [each.text for each in named if each not in mine]
+        mine = [series for series in named if (series.bus, series.address, series.word) == (bus.name, address, "")]
+        texts = [series.text for series in named if series not in mine]
         texts += [] if mine else [f"{bus.name}:{address}"]
         if texts:  # one stays
             self._type(f"/plot {' '.join(texts)}")
 
     def action_difference(self) -> None:
         named = list(plotted(self.host.session))
-        texts = [each.text for each in named if each.word != DIFFERENCE]
+        texts = [series.text for series in named if series.word != DIFFERENCE]
         if len(texts) == len(named):
-            texts += [each._replace(word=DIFFERENCE).text for each in named if not each.word]
+            texts += [series._replace(word=DIFFERENCE).text for series in named if not series.word]
         if texts:  # one stays
             self._type(f"/plot {' '.join(texts)}")
 
@@ -336,14 +338,14 @@ class PlotPage(AskingPage):
         if self.host.session.plots:
             self._type("/plot off")
             return
-        texts = " ".join(each.text for each in plotted(self.host.session))
+        texts = " ".join(series.text for series in plotted(self.host.session))
         try:
             self._type(f"/plot {texts} {plot_targets.needed().stream}")
         except Diagnostic as failure:
             self.say(f"✗ {failure}", "error")
 
     def action_copy(self) -> None:
-        served = [each.desk for each in self.host.session.plots if each.desk]
+        served = [plot.desk for plot in self.host.session.plots if plot.desk]
         if served:
             self.app.copy_to_clipboard(served[0])
             self.notify("Copied", timeout=2)

@@ -18,7 +18,7 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.program_files import Entry, Problem, in_order
+from multidrop.dialects.program_files import Problem, ProgramEntry, in_order
 from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import real_text
 from multidrop.shell.programs.program_text import ProgramGrammar
@@ -27,9 +27,9 @@ from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts
-from multidrop.tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
-from multidrop.tui.screens.page import Host, Page, start
-from multidrop.tui.screens.program_file import FileOnScreen, Seen
+from multidrop.tui.screens.dialogs import Ask, Confirm, ListedChoice, SearchDialog, offers_like
+from multidrop.tui.screens.page import Page, PageHost, start
+from multidrop.tui.screens.program_file import FileOnDisk, FileOnScreen
 from multidrop.tui.screens.program_rows import (
     LOOK_FIRST,
     MOST_PROBLEMS,
@@ -53,9 +53,9 @@ from multidrop.tui.screens.program_rows import (
 )
 from multidrop.tui.texts import OpenText
 
-PAUSE = 0.4
+CHECK_DELAY = 0.4
 """Seconds without an edit after which a text is checked, and its copy is kept."""
-WIDE = 110
+WIDE_FROM = 110
 NEWS = 3, 8
 """Least lines of the transcript below the editor; the rows of a screen for each, where there are more."""
 NO_FACTS = ProgramFacts()
@@ -68,7 +68,7 @@ class ProgramPage(Page):
     SHEET = "program"
     WANTS = frozenset({"motion", "conditions"})
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self.editor = Editor(id="editor")
         self.text: OpenText | None = None
@@ -99,7 +99,7 @@ class ProgramPage(Page):
         """Show the last text, or ask for a file."""
         self.editor.read_only = True
         self.host.texts.take = self.take_text
-        self.set_interval(PAUSE / 2, self._settle)
+        self.set_interval(CHECK_DELAY / 2, self._settle)
         self.on_resize()
         if self.host.texts.current is not None:
             self.show_text(self.host.texts.current)
@@ -121,7 +121,7 @@ class ProgramPage(Page):
     def on_resize(self) -> None:
         """Give the panels their column where there is room."""
         side = self.lines("program-side")
-        side.display = self.size.width >= WIDE
+        side.display = self.size.width >= WIDE_FROM
         side.styles.width = side_width(self.size.width)
 
     # Painting
@@ -174,9 +174,9 @@ class ProgramPage(Page):
         place = program.break_point
         if place.isdecimal():
             return dict(self.findings.addresses).get(int(place))
-        return next((each.line - 1 for each in self.findings.entries if place and each.name == place), None)
+        return next((entry.line - 1 for entry in self.findings.entries if place and entry.name == place), None)
 
-    def _entries(self) -> Sequence[Entry]:
+    def _entries(self) -> Sequence[ProgramEntry]:
         return self.grammar.entries(self.editor.text) if self.grammar is not None else ()
 
     # The text
@@ -193,7 +193,7 @@ class ProgramPage(Page):
     def _settle(self) -> None:
         """Take in the text after a pause in the editing."""
         now = asyncio.get_running_loop().time()
-        if self._edited_at is not None and now - self._edited_at >= PAUSE and not self._taking_in:
+        if self._edited_at is not None and now - self._edited_at >= CHECK_DELAY and not self._taking_in:
             self._taking_in, self._edited_at = True, None
             self.run_worker(self._take_in())
         if self.file.look_is_due(now):
@@ -207,14 +207,14 @@ class ProgramPage(Page):
             return None
         unit, shown = unit_of(self.host.session), text.text
         self._compared = lines, unit
-        found = await asyncio.to_thread(examined, grammar, shown, unit, lines)
+        findings = await asyncio.to_thread(examined, grammar, shown, unit, lines)
         if isinstance(grammar, ConfigurationGrammar):
             more = map(problem_of, self.host.look_troubles(real_text(shown), text.name))
-            found = replace(found, problems=tuple(in_order([*found.problems, *more])))
+            findings = replace(findings, problems=tuple(in_order([*findings.problems, *more])))
         self.take_text()
         if self.text is text and text.text == shown:
-            self.findings, self._checked = found, shown
-        return found
+            self.findings, self._checked = findings, shown
+        return findings
 
     async def _look_at_text(self) -> None:
         """Check the text now if it was edited since the last check: its lines have other addresses, and labels."""
@@ -251,12 +251,12 @@ class ProgramPage(Page):
     async def action_open(self, folder: str = "") -> None:
         """Choose a file to edit, of this folder or of another one."""
         self.take_text()
-        found = await asyncio.to_thread(files_in, folder)
+        files = await asyncio.to_thread(files_in, folder)
         selected = self.host.session.selected
         drive = "" if selected is None else target_of(self.host.session) or selected.product
-        find = Finder(found, self.host.texts.unsaved(), drive, folder)
+        find = Finder(files, self.host.texts.unsaved(), drive, folder)
         heading = f"Program file in {folder}" if folder else "Program file; with / a folder"
-        await self.app.push_screen(Search(heading, find, "open"), self._open)
+        await self.app.push_screen(SearchDialog(heading, find, "open"), self._open)
 
     async def _open(self, name: str | None) -> None:
         if name == UPLOAD:
@@ -295,11 +295,11 @@ class ProgramPage(Page):
         """Go to the next problem below the cursor, errors before warnings."""
         problems: Sequence[Problem] = self.findings.problems
         place = self.editor.cursor_location
-        wrong = [each for each in problems if not each.warning] or list(problems)
-        later = [each for each in wrong if (each.line - 1, each.column - 1) > place]
+        wrong = [problem for problem in problems if not problem.warning] or list(problems)
+        later = [problem for problem in wrong if (problem.line - 1, problem.column - 1) > place]
         if wrong:
-            each = (later or wrong)[0]
-            self.editor.move_cursor((each.line - 1, each.column - 1), center=True)
+            problem = (later or wrong)[0]
+            self.editor.move_cursor((problem.line - 1, problem.column - 1), center=True)
 
     def action_leave(self) -> None:
         self.take_text()
@@ -324,13 +324,13 @@ class ProgramPage(Page):
         """Look at the disk, check the text that is on the screen then, and ask; that text is sent, and no other."""
         try:
             seen = await self.file.catch_up()
-            if seen is Seen.ASKED or self.text is not text:
+            if seen is FileOnDisk.ASKED or self.text is not text:
                 return
             findings = await self._examine()
             if not self.in_front or self.text is not text or findings is None or self.host.session.stops != stops:
                 return
             target, shown, outside = target_of(self.host.session), text.text, self.file.outside
-            again = self.file.news.words if seen is Seen.READ else ""
+            again = self.file.news.words if seen is FileOnDisk.READ else ""
             facts = download_facts(text, findings, self.program, outside, again)
 
             def answered(line: str | None) -> None:
@@ -338,7 +338,7 @@ class ProgramPage(Page):
                     self.run_worker(self._download(line, text, shown, self.host.session.stops))
 
             title = f"Download {text.name} to {target or product}?"
-            answers = [(each.line, f"{each.title:<38} {each.line}") for each in download_choices(text, target)]
+            answers = [(choice.line, f"{choice.title:<38} {choice.line}") for choice in download_choices(text, target)]
             answers = [LOOK_FIRST, *answers] if again else answers
             await self.app.push_screen(Confirm(title, facts, answers), answered)
         finally:
@@ -359,17 +359,19 @@ class ProgramPage(Page):
             return
         program = self.program
         await self._look_at_text()
-        found = run_choices(self._entries(), target_of(self.host.session), program)
-        found = [each for each in found if only in each.line]
+        choices = run_choices(self._entries(), target_of(self.host.session), program)
+        choices = [choice for choice in choices if only in choice.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
         heading = f"{title} {target_of(self.host.session) or chosen.product}: its program {known}"
 
         def taken(key: str | None) -> None:
             if key is not None:
-                start(self, found[int(key)].line)
+                start(self, choices[int(key)].line)
 
-        offers = [Offer(str(number), f"{each.title:<30}  {each.line}") for number, each in enumerate(found)]
-        await self.app.push_screen(Search(heading, partial(offers_like, offers), "do it"), taken)
+        offers = [
+            ListedChoice(str(number), f"{choice.title:<30}  {choice.line}") for number, choice in enumerate(choices)
+        ]
+        await self.app.push_screen(SearchDialog(heading, partial(offers_like, offers), "do it"), taken)
 
     async def action_step(self) -> None:
         """Execute one line of a program that waits; else choose where to begin. One press is one line at most."""
@@ -391,7 +393,7 @@ class ProgramPage(Page):
         if self._break_line(program) == row:
             start(self, with_target("/break", target, "off"))
             return
-        place = next((each.name for each in self._entries() if each.line == row + 1), "")
+        place = next((entry.name for entry in self._entries() if entry.line == row + 1), "")
         place = place or next((str(at) for at, line in self.findings.addresses if line == row), "")
         if place:
             start(self, with_target("/break", target, place))

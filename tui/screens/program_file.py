@@ -17,18 +17,18 @@ from multidrop.base.errors import Diagnostic
 from multidrop.shell.programs.edited_file import ChangedMeanwhile, Outside
 from multidrop.tui.editor import ConfigurationGrammar, Grammar
 from multidrop.tui.screens.dialogs import Confirm
-from multidrop.tui.screens.page import Host
+from multidrop.tui.screens.page import PageHost
 from multidrop.tui.screens.program_rows import refusal
 from multidrop.tui.text import visible
 from multidrop.tui.texts import OpenText
 
-LOOK = 2.0
+LOOK_PERIOD = 2.0
 """Seconds between two looks at the disk while a text is shown."""
 WIDEST = 40
 """Characters of a line that a note quotes."""
 
 
-class Seen(Enum):
+class FileOnDisk(Enum):
     """What a look at the disk came to."""
 
     SAME = auto()
@@ -40,7 +40,7 @@ class Seen(Enum):
     """The disk has no other text to show, or a person has decided to keep the text on the screen."""
 
 
-class Difference(NamedTuple):
+class FirstDifference(NamedTuple):
     """The first line that differs, from 0, and its text now."""
 
     row: int = 0
@@ -52,19 +52,19 @@ class Difference(NamedTuple):
         return f"Line {self.row + 1} is now '{visible(self.now.strip())[:WIDEST]}'"
 
 
-def first_difference(before: str, now: str) -> Difference:
+def first_difference(before: str, now: str) -> FirstDifference:
     """Find the first line in which two texts differ; past the end of the new one it is empty."""
     old, new = before.split("\n"), now.split("\n")
     row = next(
         (n for n, (one, other) in enumerate(zip(old, new, strict=False)) if one != other), min(len(old), len(new))
     )
-    return Difference(row, new[row] if row < len(new) else "")
+    return FirstDifference(row, new[row] if row < len(new) else "")
 
 
-class Sheet(Protocol):
+class EditorSheet(Protocol):
     """The parts of a page with an editor that its file uses."""
 
-    host: Host
+    host: PageHost
     text: OpenText | None
     grammar: Grammar | None
 
@@ -92,11 +92,11 @@ class Sheet(Protocol):
 class FileOnScreen:
     """The file of the text that a page shows."""
 
-    def __init__(self, page: Sheet) -> None:
+    def __init__(self, page: EditorSheet) -> None:
         self._page, self._host = page, page.host
         self.outside = ""
         """What another program did to it, as was last seen and not taken in yet; empty: nothing."""
-        self.news = Difference()
+        self.news = FirstDifference()
         """Where the text that was read again last differs from the one before it."""
         self._looking = False
         self._looked_at = 0.0
@@ -143,7 +143,7 @@ class FileOnScreen:
 
     def look_is_due(self, now: float) -> bool:
         """Whether it is time for a look at the disk; a look that the disk holds up is the only one."""
-        if self._page.text is None or self._looking or now - self._looked_at < LOOK:
+        if self._page.text is None or self._looking or now - self._looked_at < LOOK_PERIOD:
             return False
         self._looking, self._looked_at = True, now
         return True
@@ -172,37 +172,37 @@ class FileOnScreen:
         finally:
             self._host.keyboard.release(self._page)
 
-    async def catch_up(self) -> Seen:
+    async def catch_up(self) -> FileOnDisk:
         """Look at the disk; read a file again that has changed, or ask where the text here has changed, too."""
         page, text = self._page, self._page.text
         if text is None:
-            return Seen.SAME
+            return FileOnDisk.SAME
         file = text.file
         seen = await asyncio.to_thread(file.look)
         if page.text is not text or text.file is not file or not page.in_front:
-            return Seen.SAME
+            return FileOnDisk.SAME
         page.take_text()
         self.outside = seen.said
-        return self._caught_up(text, seen) if seen.said else Seen.SAME
+        return self._caught_up(text, seen) if seen.said else FileOnDisk.SAME
 
-    def _caught_up(self, text: OpenText, seen: Outside) -> Seen:
+    def _caught_up(self, text: OpenText, seen: Outside) -> FileOnDisk:
         page, now = self._page, seen.now
         if now is None:
             if seen.gone:
                 text.file.lost()
                 self.outside = ""
             self._note(f"{text.name} {seen.said}. Its text stays here{'; ^S saves it' if seen.gone else ''}")
-            return Seen.KEPT
+            return FileOnDisk.KEPT
         if now.text == text.text:  # another program has saved just this text
             text.take(now)
             self._host.texts.drop_draft(text)
             self.outside = ""
-            return Seen.SAME
+            return FileOnDisk.SAME
         if text.changed:
             if text.kept_over == now.data:
-                return Seen.KEPT
+                return FileOnDisk.KEPT
             self._ask_which(text, seen)
-            return Seen.ASKED
+            return FileOnDisk.ASKED
         self.news = first_difference(text.text, now.text)
         text.take(now)
         text.cursor = (self.news.row, 0)
@@ -210,7 +210,7 @@ class FileOnScreen:
         page.show_text(text)
         self._host.keyboard.turn_deaf()  # keys that were typed before were meant for the text that was shown
         self._note(f"{text.name} {seen.said}: it was read again. {self.news.words}")
-        return Seen.READ
+        return FileOnDisk.READ
 
     def _ask_which(self, text: OpenText, seen: Outside) -> None:
         answers = [("keep", "Keep this text"), ("read", "Give up this text, read the file")]

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from multidrop.base.text import counted
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.program_files import Entry, Part, Problem, errors, in_order
+from multidrop.dialects.program_files import LinePart, Problem, ProgramEntry, errors, in_order
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.programs.edited_file import real_text
 from multidrop.shell.programs.program_text import ProgramGrammar
@@ -39,7 +39,7 @@ class Findings:
     problems: tuple[Problem, ...] = ()
     addresses: tuple[tuple[int, int], ...] = ()
     """The address of a line in the drive, and the line of the text from 0; empty unless both hold one program."""
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[ProgramEntry, ...] = ()
     """The places at which a program can begin."""
     pending: bool = False
     """The text was edited since."""
@@ -88,12 +88,12 @@ def problem_rows(problems: Sequence[Problem], at: int, width: int, most: int = M
     """The problems from the line of the cursor on (from 1), then from the top; errors before warnings; `most` rows."""
     ahead = sorted(problems, key=lambda each: (each.warning, each.line < at))
     rows: list[Row] = []
-    for each in ahead[:most]:
-        hint = f"; {each.hint}" if each.hint else ""
-        sign, role = ("!", "strong") if each.warning else ("✗", "error")
-        place = f"{each.line}:{each.column}"
+    for problem in ahead[:most]:
+        hint = f"; {problem.hint}" if problem.hint else ""
+        sign, role = ("!", "strong") if problem.warning else ("✗", "error")
+        place = f"{problem.line}:{problem.column}"
         rows.append(
-            ((f" {sign} ", role), (f"{place:<7} ", "dim"), (fit(visible(each.what + hint), width - 12), "text"))
+            ((f" {sign} ", role), (f"{place:<7} ", "dim"), (fit(visible(problem.what + hint), width - 12), "text"))
         )
     if len(problems) > most:
         rows[-1] = ((fit(f"   … and {len(problems) - most + 1} more; ^L goes from one to the next", width), "dim"),)
@@ -103,15 +103,15 @@ def problem_rows(problems: Sequence[Problem], at: int, width: int, most: int = M
 def news_rows(records: Sequence[Record], wall: Callable[[float], datetime], width: int) -> list[Row]:
     """The last lines of the transcript, a row each, with the time of day."""
     rows: list[Row] = []
-    for each in records:
-        sign, role = MARKS[each.mark]
-        head = f" {wall(each.at):%H:%M:%S} "
+    for record in records:
+        sign, role = MARKS[record.mark]
+        head = f" {wall(record.at):%H:%M:%S} "
         rows.append(
             (
                 (head, "dim"),
-                (f"{fit(each.address, 3)} ", "dim"),
+                (f"{fit(record.address, 3)} ", "dim"),
                 (f"{sign} ", role),
-                (fit(visible(each.text), width - len(head) - 6), "error" if each.mark == "x" else "text"),
+                (fit(visible(record.text), width - len(head) - 6), "error" if record.mark == "x" else "text"),
             )
         )
     return rows
@@ -127,9 +127,9 @@ def rule(title: str, width: int, right: str = "") -> Row:
 def marks_of(problems: Sequence[Problem], break_line: int | None, current: tuple[int, str] | None) -> dict[int, Mark]:
     """The signs of lines, from 0: the current line precedes errors, a break point and warnings."""
     marks: dict[int, Mark] = {}
-    for each in problems:
-        if each.line - 1 not in marks or not each.warning:
-            marks[each.line - 1] = Mark("!", "warning") if each.warning else Mark("✗", "error")
+    for problem in problems:
+        if problem.line - 1 not in marks or not problem.warning:
+            marks[problem.line - 1] = Mark("!", "warning") if problem.warning else Mark("✗", "error")
     if break_line is not None and marks.get(break_line, Mark("!", "warning")).role == "warning":
         marks[break_line] = Mark("●", "break")
     if current is not None:
@@ -157,42 +157,42 @@ def target_of(session: Session) -> str:
 
 
 def with_target(verb: str, target: str, *words: str) -> str:
-    return " ".join(each for each in (verb, target, *words) if each)
+    return " ".join(word for word in (verb, target, *words) if word)
 
 
 # Files
 
 
-class Found(NamedTuple):
+class FoundFile(NamedTuple):
     """A program file."""
 
     name: str
     about: str
 
 
-def files_in(folder: str) -> list[Found]:
+def files_in(folder: str) -> list[FoundFile]:
     """The program files in a folder, the newest first, then its folders; empty for the current one."""
     endings = {ending for files in program_languages().values() for ending in files.endings}
-    files: list[tuple[float, Found]] = []
-    folders: list[Found] = []
+    files: list[tuple[float, FoundFile]] = []
+    folders: list[FoundFile] = []
     try:
-        for each in os.scandir(folder or "."):
-            if each.is_dir() and not each.name.startswith("."):
-                folders.append(Found(f"{folder}{each.name}/", "folder"))
-            elif os.path.splitext(each.name)[1].lower() in endings and each.is_file():
-                state = each.stat()
+        for entry in os.scandir(folder or "."):
+            if entry.is_dir() and not entry.name.startswith("."):
+                folders.append(FoundFile(f"{folder}{entry.name}/", "folder"))
+            elif os.path.splitext(entry.name)[1].lower() in endings and entry.is_file():
+                state = entry.stat()
                 about = f"{state.st_size} B   {datetime.fromtimestamp(state.st_mtime):%Y-%m-%d %H:%M}"
-                files.append((state.st_mtime, Found(f"{folder}{each.name}", about)))
+                files.append((state.st_mtime, FoundFile(f"{folder}{entry.name}", about)))
     except OSError:
         return []
-    up = [Found(f"{folder}../", "the folder above")]
-    return [*(each for _, each in sorted(files, reverse=True)), *sorted(folders), *up][:MOST_FILES]
+    up = [FoundFile(f"{folder}../", "the folder above")]
+    return [*(file for _, file in sorted(files, reverse=True)), *sorted(folders), *up][:MOST_FILES]
 
 
 class Finder:
     """Finds the files whose names contain a typed text. `here`: those of the folder `base`; empty: the current one."""
 
-    def __init__(self, here: Sequence[Found], unsaved: Sequence[OpenText], drive: str, base: str = "") -> None:
+    def __init__(self, here: Sequence[FoundFile], unsaved: Sequence[OpenText], drive: str, base: str = "") -> None:
         self._folders = {base: list(here)}
         self._unsaved, self._drive, self._base = unsaved, drive, base
 
@@ -204,7 +204,7 @@ class Finder:
         if folder not in self._folders:
             self._folders[folder] = files_in(folder)
         named = {text.name: "not saved" for text in self._unsaved}
-        named |= {each.name: each.about for each in self._folders[folder] if each.name not in named}
+        named |= {file.name: file.about for file in self._folders[folder] if file.name not in named}
         matches = [_match(name, about) for name, about in named.items() if wanted.casefold() in name.casefold()]
         if self._drive and not wanted:
             program = Text.assemble(f"{f'the program in {self._drive}':<28}  ", ("/upload into a new file", "dim"))
@@ -258,26 +258,26 @@ def download_facts(
 # Run
 
 
-def run_choices(entries: Sequence[Entry], target: str, program: ProgramFacts) -> list[Choice]:
+def run_choices(entries: Sequence[ProgramEntry], target: str, program: ProgramFacts) -> list[Choice]:
     """Ways to run a program, and what else can be done while one runs or waits."""
     start = f"@{target} " if target else ""
-    found: list[Choice] = []
+    choices: list[Choice] = []
     if program.line is not None:
-        found.append(Choice("Go on at normal speed", with_target("/continue", target)))
-        found.append(Choice("Break it where it is", with_target("/break", target, "now")))
+        choices.append(Choice("Go on at normal speed", with_target("/continue", target)))
+        choices.append(Choice("Break it where it is", with_target("/break", target, "now")))
     for verb, what in (("", "Run from"), ("/trace", "Trace from"), ("/step", "Step by step from")):
-        for each in entries:
-            line = with_target(verb, target, each.name) if verb else f"{start}{each.start}"
-            found.append(Choice(f"{what} {each.name}", line))
+        for entry in entries:
+            line = with_target(verb, target, entry.name) if verb else f"{start}{entry.start}"
+            choices.append(Choice(f"{what} {entry.name}", line))
     if program.break_point:
-        found.append(Choice(f"Remove the break point {program.break_point}", with_target("/break", target, "off")))
-    return [*found, Choice("List what the drive holds", with_target("/list", target))]
+        choices.append(Choice(f"Remove the break point {program.break_point}", with_target("/break", target, "off")))
+    return [*choices, Choice("List what the drive holds", with_target("/list", target))]
 
 
 # The lines of a file and those in a drive: which line of the file has which address, where both hold one program.
 
 
-Parts = Callable[[str], Sequence[Part]]
+Parts = Callable[[str], Sequence[LinePart]]
 
 
 def aligned(text: str, rows: Sequence[tuple[int, str]], parts: Parts) -> Mapping[int, int]:
@@ -285,10 +285,10 @@ def aligned(text: str, rows: Sequence[tuple[int, str]], parts: Parts) -> Mapping
     file = [(number, bare) for number, line in enumerate(text.split("\n")) if (bare := _bare(line, parts))]
     held = [_bare(line, parts) for _, line in rows]
     size = len(held)
-    found = [at for at in range(len(file) - size + 1) if size and [bare for _, bare in file[at : at + size]] == held]
-    if len(found) != 1:
+    places = [at for at in range(len(file) - size + 1) if size and [bare for _, bare in file[at : at + size]] == held]
+    if len(places) != 1:
         return {}
-    return {address: number for (address, _), (number, _) in zip(rows, file[found[0] :], strict=False)}
+    return {address: number for (address, _), (number, _) in zip(rows, file[places[0] :], strict=False)}
 
 
 def _bare(line: str, parts: Parts) -> str:
@@ -309,9 +309,9 @@ def unit_of(session: Session) -> Unit:
 
 def refusal(grammar: Grammar | None, text: OpenText) -> str:
     """Say why a macro that is wrong is not saved; empty: it is saved. The old macro stays, and the text."""
-    if not isinstance(grammar, MacroGrammar) or not (found := grammar.check(real_text(text.text), "")):
+    if not isinstance(grammar, MacroGrammar) or not (problems := grammar.check(real_text(text.text), "")):
         return ""
-    return f"{found[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
+    return f"{problems[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
 
 
 def examined(grammar: Grammar, text: str, unit: Unit, lines: tuple[tuple[int, str], ...]) -> Findings:

@@ -10,11 +10,11 @@ from rich.text import Text
 from textual.app import App
 
 from multidrop.drives.bus import Bus
-from multidrop.shell.channel import Field
+from multidrop.shell.channel import AskedValue
 from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session
 from multidrop.tui.panels.view import Glance
-from multidrop.tui.screens.dialogs import Confirm, Dialog, Form, GoOn, Match, Offer, TooSmall
+from multidrop.tui.screens.dialogs import Confirm, Dialog, FormDialog, GoOn, ListedChoice, Match, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.text import visible
@@ -28,7 +28,7 @@ FOUND = 100
 """Greatest number of history lines that a search lists; a longer text finds older ones."""
 
 
-class Questions:
+class ScreenQuestions:
     """Opens the dialogs of an app. Each method returns once its dialog is open and has the focus.
 
     `closed` is called after a question that the session asked.
@@ -76,9 +76,9 @@ class Questions:
         finally:
             self._main.give_room(0)
 
-    async def fill(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
+    async def fill(self, title: str, fields: Sequence[AskedValue]) -> dict[str, str] | None:
         """Ask for values; return them by name, None if the form was closed. A cancellation closes it."""
-        return await self._answer(Form(title, fields))
+        return await self._answer(FormDialog(title, fields))
 
     async def _answer(self, screen: Dialog[T], shown: Callable[[], None] = lambda: None) -> T | None:
         """Ask, and return the answer; keys that were typed before the question is shown are not for it."""
@@ -114,10 +114,10 @@ def place_of(key: str) -> tuple[str, str]:
     return address, bus
 
 
-def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> tuple[list[Offer], str]:
+def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> tuple[list[ListedChoice], str]:
     """Every drive of every bus, the selected bus first, and the key of the selected one: bus, line feed, address."""
     now = session.now()
-    options: list[Offer] = []
+    options: list[ListedChoice] = []
     current = ""
     for bus in sorted(session.tabs.shown, key=lambda bus: bus.name != session.selected_bus):
         for glance in glances(bus):
@@ -125,12 +125,12 @@ def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> t
             current = key if glance.selected else current
             sign = glance.sign(now)[0]
             text = f" {bus.name:<8} {glance.address:<3} {glance.label:<12} {sign} {glance.product}"
-            options.append(Offer(key, text, f"{bus.name} {glance.address} {glance.label}"))
+            options.append(ListedChoice(key, text, f"{bus.name} {glance.address} {glance.label}"))
     return options, current
 
 
 def lines_like(lines: Sequence[str], typed: str) -> list[Match]:
     """The lines that contain the typed text, in the order given."""
     wanted = typed.casefold()
-    found = (line for line in lines if wanted in line.casefold())
-    return [Match(line, Text(visible(line))) for line, _ in zip(found, range(FOUND), strict=False)]
+    matching = (line for line in lines if wanted in line.casefold())
+    return [Match(line, Text(visible(line))) for line, _ in zip(matching, range(FOUND), strict=False)]

@@ -15,7 +15,7 @@ Column = tuple[str, dict[str, Value]]
 """The name of the other side of a comparison, and its values."""
 
 
-class Table(Protocol):
+class EditedSettings(Protocol):
     """The table of settings, as far as a file needs it."""
 
     other: Column | None
@@ -29,7 +29,10 @@ class FileColumn:
     """The file of a comparison. `say` shows a line, `run` runs work in the background; `table` gives the table."""
 
     def __init__(
-        self, table: Callable[[], Table], say: Callable[[str], None], run: Callable[[Coroutine[Any, Any, None]], object]
+        self,
+        table: Callable[[], EditedSettings],
+        say: Callable[[str], None],
+        run: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
         self._table, self._say, self._run = table, say, run
         self._file: files.SettingsFile | None = None
@@ -47,15 +50,15 @@ class FileColumn:
     async def _load(self, path: str, drive: Drive | None, done: Callable[[], None]) -> None:
         table = self._table()
         try:
-            found = await asyncio.to_thread(files.load, path)
+            settings_file = await asyncio.to_thread(files.load, path)
             language = drive.family.values.parameters.language if drive is not None else ""
-            if language and found.language and found.language != language:
-                raise Diagnostic(f"has settings in {found.language}, this drive has {language}", path)
+            if language and settings_file.language and settings_file.language != language:
+                raise Diagnostic(f"has settings in {settings_file.language}, this drive has {language}", path)
         except Diagnostic as failure:
             self._say(f"nothing was sent: {failure}")
             return
         if self._table() is table:  # else another drive is shown by now
-            self._take(found)
+            self._take(settings_file)
             done()
 
     async def _load_again(self, file: files.SettingsFile) -> None:

@@ -20,7 +20,7 @@ from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
 from multidrop.tui.assist import EDIT, Assist, StartEntry
 from multidrop.tui.key_table import hint
-from multidrop.tui.screens.dialogs import Field, Hint, Options, Over
+from multidrop.tui.screens.dialogs import ChoiceList, Hint, InputField, Over
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
 
@@ -36,7 +36,7 @@ KINDS = (
     ("port", "Serial ports"),
     ("demo", "Without hardware"),
 )
-AGAIN = 3.0
+LOOK_PERIOD = 3.0
 """Seconds after which ports are looked for again."""
 Connect = Callable[[str, bool], Awaitable[str]]
 """Opens a URL, raw or not; returns an empty string, or one line with the reason of the failure."""
@@ -67,9 +67,9 @@ class Start(Over[None]):
             yield Static("multidrop", classes="title")
             yield Static("a terminal for motion drives on a shared line", classes="about")
             about = "type to narrow, or a URL: /dev/ttyUSB0?baud=19200, tcp://HOST:503"
-            yield Field(self._entered, edited=lambda text: self._fill(), placeholder=about, id="url")
+            yield InputField(self._entered, edited=lambda text: self._fill(), placeholder=about, id="url")
             yield Static("", id="outcome", markup=False)
-            options = Options((), self._taken, id="places")
+            options = ChoiceList((), self._taken, id="places")
             options.can_focus = False
             yield options
             self.hint = hint("start").replace("Esc close", "^Q quit" if self.only else "Esc close")
@@ -78,33 +78,39 @@ class Start(Over[None]):
     def begin(self) -> None:
         """Show what is known at once; add the ports when they are found."""
         self._fill()
-        self.set_focus(self.query_one(Field))
+        self.set_focus(self.query_one(InputField))
         self.run_worker(self._look())
-        self.set_interval(AGAIN, self._look)
+        self.set_interval(LOOK_PERIOD, self._look)
         if self._trouble:
             self.show(f"✗ {self._trouble}", bad=True)
 
     async def _look(self) -> None:
         """Look for ports, unless one is in use now: a search or an opening has it."""
-        found = self._found if self._opening else await self._assist.ports()
-        if found != self._found:
-            self._found = found
+        ports = self._found if self._opening else await self._assist.ports()
+        if ports != self._found:
+            self._found = ports
             self._fill()
 
     def _listed(self, typed: str) -> list[StartEntry]:
         """The offers that contain the typed words, and the typed text itself as a URL."""
         known = [*self._assist.saved(), *self._assist.lately(), *(self._found or ()), DEMO, TOUR]
-        all_ = [*self._assist.wrong(), *self._tried.values(), *(each for each in known if each.url not in self._tried)]
+        all_ = [
+            *self._assist.wrong(),
+            *self._tried.values(),
+            *(start_entry for start_entry in known if start_entry.url not in self._tried),
+        ]
         words = typed.casefold().split()
-        fitting = [each for each in all_ if all(word in " ".join(each).casefold() for word in words)]
+        fitting = [
+            start_entry for start_entry in all_ if all(word in " ".join(start_entry).casefold() for word in words)
+        ]
         is_url = bool(typed) and typed not in self._tried and (any(sign in typed for sign in ":/?") or not fitting)
         own = [StartEntry("typed", typed, typed, "open this")]
         return [*own, *fitting] if is_url else fitting
 
     def _fill(self) -> None:
-        options = self.query_one(Options)
+        options = self.query_one(ChoiceList)
         before = self._highlighted
-        typed = self.query_one(Field).value.strip()
+        typed = self.query_one(InputField).value.strip()
         places = self._listed(typed)
         options.clear_options()
         self._places = []
@@ -124,15 +130,15 @@ class Start(Over[None]):
 
     def _add(self, place: StartEntry | None, text: Text) -> None:
         self._places.append(place)
-        self.query_one(Options).add_option(Option(text, disabled=place is None))
+        self.query_one(ChoiceList).add_option(Option(text, disabled=place is None))
 
     @property
     def _highlighted(self) -> StartEntry | None:
-        number = self.query_one(Options).highlighted
+        number = self.query_one(ChoiceList).highlighted
         return self._places[number] if number is not None and number < len(self._places) else None
 
     def action_step(self, by: int) -> None:
-        options = self.query_one(Options)
+        options = self.query_one(ChoiceList)
         if by > 0:
             options.action_cursor_down()
         else:
@@ -141,7 +147,7 @@ class Start(Over[None]):
     def action_edit(self) -> None:
         """Put the URL of what is highlighted into the line; of a port with its baud rate."""
         if (place := self._highlighted) is not None and place.url not in (TOUR.url, EDIT):
-            field = self.query_one(Field)
+            field = self.query_one(InputField)
             field.value = f"{place.url}?baud=9600" if place.kind == "port" else place.url
             field.cursor_position = len(field.value)
 
@@ -191,7 +197,7 @@ class Start(Over[None]):
             self.run_worker(self._scan(place.url), group="scan")
 
     async def _scan(self, url: str) -> None:
-        words, field = list[str](), self.query_one(Field)
+        words, field = list[str](), self.query_one(InputField)
         before = field.value
 
         def found(text: str) -> None:

@@ -8,7 +8,7 @@ from multidrop.base.text import counted
 from multidrop.tui.panels.table import piece_rows
 from multidrop.tui.panels.view import View, names_on
 from multidrop.tui.screen_model import TrafficStore
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import Page, PageHost
 from multidrop.tui.text import visible
 from multidrop.tui.widgets.lines import Row, spread
 
@@ -22,7 +22,7 @@ class TrafficPage(Page):
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "traffic": "1fr"}
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self._bottom: int | None = None
         """The number of the last piece in view; None: the newest."""

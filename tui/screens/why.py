@@ -24,15 +24,15 @@ from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row, beside, spread
 
-WIDE = 110
+WIDE_FROM = 110
 """Width from which the curves are beside the facts."""
 LABEL = 11
 SENT, MOST_SENT, LOOKED = 2, 6, 400
 """Lines of what was sent and came back: the fewest, the most above curves, and the records that are searched."""
-LINES = 3
+LISTING_ROWS = 3
 """Lines of the program around the one that it executes."""
 HELPS = 3
-LEAST, LOW, CHART = 6, 3, 9
+LEAST_ROWS, LOWEST_CHART, CHART = 6, 3, 9
 """Least rows of the drive and of the curves, and most rows of curves that are no charts."""
 MARKS = frozenset({">", "»", "", "x"})
 """Marks of the lines of a drive, of their replies and of their failures."""
@@ -65,16 +65,19 @@ class WhyPage(SendingPage):
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
-        wide = width >= WIDE
+        wide = width >= WIDE_FROM
         room = width // 2 if wide else width
         one = replace(view, only=(Series(view.session.selected_bus, glance.address),))
         known = [*self._facts(view, glance, drive, room)]
-        spare = height - len(known) - SENT - 1 - (0 if wide else LOW)
-        rows = [*drive_rows(view, room, max(LEAST, spare)), *known]
-        sent = height - len(rows) if wide else min(MOST_SENT, height - len(rows) - LOW)
+        spare = height - len(known) - SENT - 1 - (0 if wide else LOWEST_CHART)
+        rows = [*drive_rows(view, room, max(LEAST_ROWS, spare)), *known]
+        sent = height - len(rows) if wide else min(MOST_SENT, height - len(rows) - LOWEST_CHART)
         rows += self._sent(view, glance, room, max(SENT, sent - 1))
         if not wide:
-            return [*rows[: height - LOW], *self._curves(one, glance, width, height - min(len(rows), height - LOW))]
+            return [
+                *rows[: height - LOWEST_CHART],
+                *self._curves(one, glance, width, height - min(len(rows), height - LOWEST_CHART)),
+            ]
         curves = self._curves(one, glance, width - room - 1, height)
         curves += [()] * (len(rows) - len(curves))
         return beside(rows, [(("│", "rule"), *curve) for curve in curves], room)[:height]
@@ -96,14 +99,14 @@ class WhyPage(SendingPage):
             for number, row in enumerate(at_words(text, width - LABEL - 1)):
                 yield (f" {'' if number else label:<{LABEL}}", "dim"), (row, role)
         if glance.readout.program.lines and spot_of(glance.readout) is not None:
-            yield from listing_rows(glance.readout, width, LINES)
+            yield from listing_rows(glance.readout, width, LISTING_ROWS)
 
     def _sent(self, view: View, glance: Glance, width: int, most: int) -> list[Row]:
         """The last lines that were sent to the drive, and what came back."""
         own = [
-            each
-            for each in self.host.last_records(LOOKED)
-            if each.mark in MARKS and each.address == glance.address and not each.text.startswith("/")
+            record
+            for record in self.host.last_records(LOOKED)
+            if record.mark in MARKS and record.address == glance.address and not record.text.startswith("/")
         ]
         return [rule("sent to it last", width), *news_rows(own[-most:], view.session.wall, width)]
 
@@ -177,22 +180,22 @@ def meaning(drive: Drive, code: int) -> str:
         lines = drive.family.language.describe_error(code, drive.product)
     except Diagnostic:
         return f"error {code}, which the manual does not explain"
-    return "; ".join(" ".join(each.split()).removeprefix("do ") for each in lines)
+    return "; ".join(" ".join(line.split()).removeprefix("do ") for line in lines)
 
 
 def helping(glance: Glance, drive: Drive) -> list[tuple[str, str]]:
     """Three keys that help, each with what it does."""
     axes = glance.readout.axes
     lamps = [lamp for axis in axes if axis.conditions is not None for lamp in axis.conditions.lamps]
-    found = [("r", f"{line}, then Enter: {CLEARS}") for line in error_lines(drive, axes)]
+    offers = [("r", f"{line}, then Enter: {CLEARS}") for line in error_lines(drive, axes)]
     if any(lamp.on and lamp.function in LIMITS for lamp in lamps):
-        found.append(("^N", "controls: jog away from the limit"))
+        offers.append(("^N", "controls: jog away from the limit"))
     elif any(axis.no_current for axis in axes):
-        found.append(("^N", "controls: current in the motor"))
+        offers.append(("^N", "controls: current in the motor"))
     if glance.lost or glance.readout.silent_since is not None:
-        found.append(("t", "traffic: what is sent and received on the line"))
-    found += [("^E", "its program: list, trace, step"), ("^N", "controls: jog, stop, home"), ("^G", "its curves")]
+        offers.append(("t", "traffic: what is sent and received on the line"))
+    offers += [("^E", "its program: list, trace, step"), ("^N", "controls: jog, stop, home"), ("^G", "its curves")]
     kept: dict[str, str] = {}
-    for key, text in found:
+    for key, text in offers:
         kept.setdefault(key, text)
     return list(kept.items())[:HELPS]

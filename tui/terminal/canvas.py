@@ -89,7 +89,7 @@ SEEN_ON_BLANKS = frozenset({4, 7, 9})
 """Codes of the attributes that change the look of a blank."""
 
 
-class Look(NamedTuple):
+class CellLook(NamedTuple):
     """The codes of a cell: those of its colours (empty: the terminal's own), and those of its attributes."""
 
     colour: str
@@ -97,7 +97,7 @@ class Look(NamedTuple):
     attributes: frozenset[int]
 
 
-PLAIN = Look("", "", frozenset())
+PLAIN = CellLook("", "", frozenset())
 
 
 class Pens:
@@ -105,8 +105,8 @@ class Pens:
 
     def __init__(self, system: ColorSystem | None) -> None:
         self._system = system
-        self._looks: list[Look] = [PLAIN]
-        self._numbers: dict[Look, int] = {PLAIN: 0}
+        self._looks: list[CellLook] = [PLAIN]
+        self._numbers: dict[CellLook, int] = {PLAIN: 0}
         self._of: dict[Style, int] = {}
         self._changes: dict[tuple[int, int], str] = {}
         self._blanks: dict[int, int] = {0: 0}
@@ -115,39 +115,39 @@ class Pens:
         """The pen of a style; 0 is the terminal's own look."""
         if style is None:
             return 0
-        found = self._of.get(style)
-        if found is None:
+        number = self._of.get(style)
+        if number is None:
             if len(self._of) >= MOST_STYLES:
                 self._of.clear()
             attributes = frozenset(on for name, on, _ in ATTRIBUTES if getattr(style, name))
-            found = self._of[style] = self._number(
-                Look(self._codes(style.color, True), self._codes(style.bgcolor, False), attributes)
+            number = self._of[style] = self._number(
+                CellLook(self._codes(style.color, True), self._codes(style.bgcolor, False), attributes)
             )
-        return found
+        return number
 
     def blank(self, pen: int) -> int:
         """A pen that makes the same blank: the colour of letters does not count there."""
-        found = self._blanks.get(pen)
-        if found is None:
+        number = self._blanks.get(pen)
+        if number is None:
             look = self._looks[pen]
             seen = look.attributes & SEEN_ON_BLANKS
-            found = self._blanks[pen] = pen if seen else self._number(Look("", look.ground, frozenset()))
-        return found
+            number = self._blanks[pen] = pen if seen else self._number(CellLook("", look.ground, frozenset()))
+        return number
 
     def change(self, before: int, after: int) -> str:
         if before == after:
             return ""
-        found = self._changes.get((before, after))
-        if found is None:
-            found = self._changes[before, after] = self._sequence(self._looks[before], self._looks[after])
-        return found
+        change = self._changes.get((before, after))
+        if change is None:
+            change = self._changes[before, after] = self._sequence(self._looks[before], self._looks[after])
+        return change
 
-    def _number(self, look: Look) -> int:
-        found = self._numbers.get(look)
-        if found is None:
-            found = self._numbers[look] = len(self._looks)
+    def _number(self, look: CellLook) -> int:
+        number = self._numbers.get(look)
+        if number is None:
+            number = self._numbers[look] = len(self._looks)
             self._looks.append(look)
-        return found
+        return number
 
     def _codes(self, colour: Color | None, letters: bool) -> str:
         """The codes of a colour, the shortest that are exact."""
@@ -159,7 +159,7 @@ class Pens:
         return ";".join(fitting.get_ansi_codes(foreground=letters))
 
     @staticmethod
-    def _sequence(before: Look, after: Look) -> str:
+    def _sequence(before: CellLook, after: CellLook) -> str:
         afresh = ["0", *map(str, sorted(after.attributes)), after.colour, after.ground]
         lost = before.attributes - after.attributes
         off = {on: end for _, on, end in ATTRIBUTES}
@@ -186,7 +186,7 @@ Piece = tuple[int, Iterable[Segment]]
 """A column, and the segments from there on."""
 
 
-class Shown(NamedTuple):
+class CanvasRow(NamedTuple):
     """A row: a character and a pen for each cell."""
 
     text: str
@@ -208,7 +208,7 @@ class Canvas:
     def __init__(self, system: ColorSystem | None) -> None:
         self._pens = Pens(system)
         self._size = (0, 0)
-        self._rows: list[Shown] = []
+        self._rows: list[CanvasRow] = []
         self._pen = 0
 
     def forget(self) -> None:
@@ -216,15 +216,15 @@ class Canvas:
         self._rows = [self._unseen] * len(self._rows)
 
     @property
-    def _unseen(self) -> Shown:
-        return Shown(UNSEEN * self._size[0], TAIL * self._size[0])
+    def _unseen(self) -> CanvasRow:
+        return CanvasRow(UNSEEN * self._size[0], TAIL * self._size[0])
 
     def draw(self, pieces: Mapping[int, Iterable[Piece]], width: int, height: int) -> str:
         """Return what shows these pieces, by row. It begins and ends with the terminal's own look."""
         if self._size != (width, height):
             self._size = (width, height)
             self._rows = [self._unseen] * height
-        drawn: dict[int, Shown] = {}
+        drawn: dict[int, CanvasRow] = {}
         plain: dict[int, list[Piece]] = {}
         self._pen = 0
         for y, wide in pieces.items():
@@ -243,7 +243,7 @@ class Canvas:
 
     # A row
 
-    def _compose(self, shown: Shown, row: Iterable[Piece], width: int) -> Shown | None:
+    def _compose(self, shown: CanvasRow, row: Iterable[Piece], width: int) -> CanvasRow | None:
         """The row with the pieces in place; None if a character shares a cell with another."""
         text, pens = shown
         for x, segments in row:
@@ -251,16 +251,16 @@ class Canvas:
             for piece, style, control in segments:
                 if control or not piece:
                     continue
-                found = cells(piece)
-                if found is None:
+                composed = cells(piece)
+                if composed is None:
                     return None
                 pen = self._pens.number(style)
-                new_text.append(found)
-                new_pens.append(chr(self._pens.blank(pen) if piece.isspace() else pen) * len(found))
+                new_text.append(composed)
+                new_pens.append(chr(self._pens.blank(pen) if piece.isspace() else pen) * len(composed))
             put, put_pens = "".join(new_text)[: width - x], "".join(new_pens)[: width - x]
             text = text[:x] + put + text[x + len(put) :]
             pens = pens[:x] + put_pens + pens[x + len(put) :]
-        return Shown(text, pens)
+        return CanvasRow(text, pens)
 
     def _write_plainly(self, y: int, row: Iterable[Piece], width: int) -> str:
         """Write pieces whose characters share cells, as they are. What the row shows then is not known.
@@ -276,7 +276,7 @@ class Canvas:
                     written += [self._switch(self._pens.number(style)), text]
         return "".join([*written, "\x1b[?7h"])
 
-    def _changed(self, y: int, new: Shown) -> str:
+    def _changed(self, y: int, new: CanvasRow) -> str:
         """Write the cells of a row that differ."""
         old, self._rows[y] = self._rows[y], new
         written: list[str] = []
@@ -288,7 +288,7 @@ class Canvas:
             end = stop
         return "".join(written)
 
-    def _run(self, new: Shown, start: int, stop: int) -> str:
+    def _run(self, new: CanvasRow, start: int, stop: int) -> str:
         """Write cells with as few changes of the pen as possible."""
         written: list[str] = []
         at = start
@@ -308,12 +308,12 @@ class Canvas:
 
     # Rows that move
 
-    def _scrolled(self, drawn: dict[int, Shown]) -> str:
+    def _scrolled(self, drawn: dict[int, CanvasRow]) -> str:
         """Let the terminal move rows up that it shows further down; the rest is still to be drawn."""
-        found = self._moved(drawn)
-        if found is None:
+        moved = self._moved(drawn)
+        if moved is None:
             return ""
-        top, bottom, by = found
+        top, bottom, by = moved
         before = self._rows[top : bottom + 1]
         self._rows[top : bottom + 1] = before[by:] + [self._unseen] * by
         for y, old in enumerate(before, top):
@@ -323,7 +323,7 @@ class Canvas:
         newlines = "\n" * by
         return f"{self._switch(0)}\x1b[{top + 1};{bottom + 1}r\x1b[{bottom + 1};1H{newlines}\x1b[r"
 
-    def _moved(self, drawn: dict[int, Shown]) -> tuple[int, int, int] | None:
+    def _moved(self, drawn: dict[int, CanvasRow]) -> tuple[int, int, int] | None:
         """(first row, last row, by how many rows up) of the rows that moved; None if it is not worth it."""
         where = {row: y for y, row in enumerate(self._rows) if row.text.strip(" " + UNSEEN)}
         steps = Counter(where[row] - y for y, row in drawn.items() if row in where and where[row] > y)
@@ -335,7 +335,7 @@ class Canvas:
         return None
 
 
-def _differences(old: Shown, new: Shown) -> list[tuple[int, int]]:
+def _differences(old: CanvasRow, new: CanvasRow) -> list[tuple[int, int]]:
     """The runs of cells that differ; runs that are close together are one."""
     runs: list[tuple[int, int]] = []
     pairs = zip(old.text, new.text, old.pens, new.pens, strict=True)
@@ -364,18 +364,18 @@ def pieces_of(update: CompositorUpdate) -> dict[int, list[Piece]]:
         rows = enumerate(update.strips, update.region.y)
         return {y: _side_by_side(strips, update.region.x) for y, strips in rows}
     assert isinstance(update, ChopsUpdate), "the app is not inline"
-    found: dict[int, list[Piece]] = {}
+    by_row: dict[int, list[Piece]] = {}
     for y, begin, end in update.spans:
-        row = found.setdefault(y, [])
+        row = by_row.setdefault(y, [])
         for stop, (x, strip) in zip(update.chop_ends[y], update.chops[y].items(), strict=False):
             if strip is not None and x <= end and stop > begin:
                 row.append((x, strip if stop <= end else strip.crop(0, end - x)))
-    return found
+    return by_row
 
 
 def _side_by_side(strips: Iterable[Strip], x: int) -> list[Piece]:
-    found: list[Piece] = []
+    joined: list[Piece] = []
     for strip in strips:
-        found.append((x, strip))
+        joined.append((x, strip))
         x += strip.cell_length
-    return found
+    return joined

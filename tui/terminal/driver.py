@@ -36,7 +36,7 @@ from textual.message import Message
 from multidrop.base.isolation import isolated
 from multidrop.shell.streams.output_streams import descriptor_writer
 from multidrop.shell.threads import Loss
-from multidrop.tui.frame_scheduler import Pace
+from multidrop.tui.frame_scheduler import TerminalPace
 from multidrop.tui.terminal.canvas import Canvas, pieces_of
 from multidrop.tui.terminal.keystream import STOP, KeyStream
 
@@ -101,7 +101,7 @@ class Terminal(PlatformDriver):
         assert stream is not None, "there is a terminal"
         self._encoding, self._descriptor = stream.encoding, stream.fileno()
         self._out = descriptor_writer(self._descriptor, self._takes_again, lambda problem: None)
-        self.pace = Pace(time.monotonic, self._handed_over)
+        self.pace = TerminalPace(time.monotonic, self._handed_over)
         self._leaving = False
         self._mouse_on = True
         self._canvas = Canvas(COLOURS.get(self._app.console.color_system or ""))

@@ -25,13 +25,13 @@ from textual.errors import NoWidget
 from textual.message import Message
 from textual.widgets import Input, TextArea
 
-SLICE = 0.003
+LONGEST_KEY_SLICE = 0.003
 """Greatest time in seconds of one turn."""
 RUN = 512
 """Greatest number of characters that go into a field together."""
-PAUSE = 0.5
+DEAF_TIME = 0.5
 """Seconds without a key after which keys count again, once the screen has changed under them."""
-PATIENCE = 0.25
+LONGEST_KEY_WAIT = 0.25
 """Greatest time in seconds that a widget gets to handle a click."""
 EARLY = "the screen changed while you typed: these keys were dropped; keys count again after a pause"
 MOST_DROPPED = 1 << 16
@@ -127,7 +127,7 @@ class Keyboard:
 
     def turn_deaf(self) -> None:
         """Discard keys until a pause: the screen changed by itself, and the person has not seen it yet."""
-        self._deaf_until, self._deaf = time.monotonic() + PAUSE, 0
+        self._deaf_until, self._deaf = time.monotonic() + DEAF_TIME, 0
         if not self._held:
             self._dropped = ""
         waited = list(self._waiting)
@@ -151,7 +151,7 @@ class Keyboard:
     def _not_heard(self) -> bool:
         if time.monotonic() >= self._deaf_until:
             return False
-        self._deaf_until = time.monotonic() + PAUSE
+        self._deaf_until = time.monotonic() + DEAF_TIME
         self._deaf += 1
         if self._deaf == 1:
             self._warn(EARLY)
@@ -184,7 +184,7 @@ class Keyboard:
         return self._waiting.popleft()
 
     async def _turn(self) -> None:
-        screen, until = self._app.screen, time.monotonic() + SLICE
+        screen, until = self._app.screen, time.monotonic() + LONGEST_KEY_SLICE
         try:
             # Another screen appears between turns, after what the previous event left to do.
             while self._app.screen is screen and time.monotonic() < until and (event := self._next()) is not None:
@@ -211,9 +211,9 @@ class Keyboard:
         elif isinstance(field, TextArea) and not field.read_only and _plain(key):
             field.replace(self._run(key), *field.selection, maintain_selection_offset=False)
         else:
-            found = self._binding(key.key) or (self._binding(key.key.lower()) if len(key.key) == 1 else None)
-            if found is not None:
-                binding, node, enabled = found
+            bound = self._binding(key.key) or (self._binding(key.key.lower()) if len(key.key) == 1 else None)
+            if bound is not None:
+                binding, node, enabled = bound
                 if enabled:
                     await self._app.run_action(binding.action, node)
 
@@ -234,14 +234,14 @@ class Keyboard:
         `Screen.active_bindings` would ask for each key whether its action is possible. That takes longer than all else
         between Enter and the wire.
         """
-        found: tuple[Binding, DOMNode, bool] | None = None
+        bound: tuple[Binding, DOMNode, bool] | None = None
         for node, bindings in self._app.screen._modal_binding_chain:
             for binding in bindings.key_to_bindings.get(key, ()):
                 possible = self._app._check_action_state(binding.action, node)
-                first = found is None or (binding.priority and not found[0].priority)
+                first = bound is None or (binding.priority and not bound[0].priority)
                 if possible is not False and first:
-                    found = binding, node, bool(possible)
-        return found
+                    bound = binding, node, bool(possible)
+        return bound
 
     async def _click(self, event: events.MouseDown | events.MouseUp) -> None:
         app = self._app
@@ -266,5 +266,5 @@ async def _worked_off(node: DOMNode) -> None:
     done = asyncio.Event()
     if node.call_later(done.set):
         with suppress(TimeoutError):
-            async with asyncio.timeout(PATIENCE):
+            async with asyncio.timeout(LONGEST_KEY_WAIT):
                 await done.wait()

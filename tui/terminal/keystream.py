@@ -30,7 +30,7 @@ from textual.message import Message
 
 ESC = "\x1b"
 PASTE_BEGINS, PASTE_ENDS = "\x1b[200~", "\x1b[201~"
-MOST = 1 << 20
+LONGEST_PASTE = 1 << 20
 """Greatest number of characters of a paste."""
 SEQUENCE = re.compile(
     r"""\x1b(?:
@@ -63,7 +63,7 @@ def know_alt_digits() -> None:
 know_alt_digits()
 
 
-class Kind(Enum):
+class PieceKind(Enum):
     """The kind of a piece."""
 
     TEXT = "text"
@@ -74,14 +74,14 @@ class Kind(Enum):
     """A paste that was too long to store."""
 
 
-class Piece(NamedTuple):
+class InputPiece(NamedTuple):
     """A piece of the input; of a paste, the text between its marks."""
 
-    kind: Kind
+    kind: PieceKind
     text: str
 
 
-LONE = Piece(Kind.ESCAPE, ESC)
+LONE = InputPiece(PieceKind.ESCAPE, ESC)
 
 
 class Splitter:
@@ -99,23 +99,23 @@ class Splitter:
         """True if an Escape or a sequence is unfinished."""
         return bool(self._rest) and not self.pasting
 
-    def split(self, text: str) -> Iterator[Piece]:
+    def split(self, text: str) -> Iterator[InputPiece]:
         text, self._rest = self._rest + text, ""
         while text:
             if self.pasting:
-                found, text = self._pasted(text)
+                pieces, text = self._pasted(text)
             else:
-                found, text = self._typed(text)
-            yield from found
+                pieces, text = self._typed(text)
+            yield from pieces
 
-    def alone(self) -> Iterator[Piece]:
+    def alone(self) -> Iterator[InputPiece]:
         """Yield the Escape key if nothing follows it. The beginning of a sequence is not a key yet, and waits."""
         rest = self._rest
         if self.pasting or rest.startswith(f"{ESC}[") and rest not in ANSI_SEQUENCES_KEYS:
             return
         self._rest = ""
         if rest in ANSI_SEQUENCES_KEYS and rest != ESC:
-            yield Piece(Kind.SEQUENCE, rest)
+            yield InputPiece(PieceKind.SEQUENCE, rest)
         elif rest:
             yield LONE
             yield from self.split(rest[1:])
@@ -127,16 +127,16 @@ class Splitter:
     def leave(self) -> None:
         self.pasting, self._rest, self._paste, self._size = False, "", [], 0
 
-    def _typed(self, text: str) -> tuple[list[Piece], str]:
+    def _typed(self, text: str) -> tuple[list[InputPiece], str]:
         """Split off the first piece of a text; return it and the rest."""
         at = text.find(ESC)
         if at:
             at = len(text) if at < 0 else at
-            return [Piece(Kind.TEXT, text[:at])], text[at:]
+            return [InputPiece(PieceKind.TEXT, text[:at])], text[at:]
         match = SEQUENCE.match(text)
         if match is not None and self._known(match[0]):
             self.pasting = match[0] == PASTE_BEGINS
-            pieces = [] if self.pasting else [Piece(Kind.SEQUENCE, match[0])]
+            pieces = [] if self.pasting else [InputPiece(PieceKind.SEQUENCE, match[0])]
             return pieces, text[match.end() :]
         begun = BEGUN.match(text)
         if begun is not None and begun.end() == len(text):
@@ -150,7 +150,7 @@ class Splitter:
     def _known(sequence: str) -> bool:
         return not sequence.startswith(f"{ESC}O") or sequence in ANSI_SEQUENCES_KEYS
 
-    def _pasted(self, text: str) -> tuple[list[Piece], str]:
+    def _pasted(self, text: str) -> tuple[list[InputPiece], str]:
         """Split off a paste at its end in a text; return it and the rest."""
         at = text.find(PASTE_ENDS)
         if at < 0:
@@ -159,13 +159,17 @@ class Splitter:
             self._rest = text[kept:]
             return [], ""
         self._keep(text[:at])
-        piece = Piece(Kind.PASTE, "".join(self._paste)) if self._size <= MOST else Piece(Kind.TOO_LONG, "")
+        piece = (
+            InputPiece(PieceKind.PASTE, "".join(self._paste))
+            if self._size <= LONGEST_PASTE
+            else InputPiece(PieceKind.TOO_LONG, "")
+        )
         self.leave()
         return [piece], text[at + len(PASTE_ENDS) :]
 
     def _keep(self, text: str) -> None:
         self._size += len(text)
-        if self._size <= MOST:
+        if self._size <= LONGEST_PASTE:
             self._paste.append(text)
 
 
@@ -173,9 +177,9 @@ STOP = b"\x18"
 """Ctrl+X."""
 LEAVE = b"\x03"
 """Ctrl+C, which ends an endless paste."""
-SLICE = 0.002
+LONGEST_SPLIT_SLICE = 0.002
 """Seconds of parsing before the loop may do something else."""
-STALLED = 1.0
+PASTE_TIMEOUT = 1.0
 """Seconds without a byte after which an endless paste is reported."""
 
 
@@ -198,7 +202,7 @@ class KeyStream:
         self._splitter = Splitter()
         self._decode = getincrementaldecoder("utf-8")(errors="replace").decode
         self._parser = XTermParser()
-        self._pieces: deque[Piece] = deque()
+        self._pieces: deque[InputPiece] = deque()
         self._waiting = 0
         """Number of their characters."""
         self._events: Iterator[Message] = iter(())
@@ -218,7 +222,7 @@ class KeyStream:
     @property
     def enter_waits(self) -> bool:
         """Whether Enter is in the text that is not parsed yet."""
-        texts = (piece.text for piece in self._pieces if piece.kind is Kind.TEXT)
+        texts = (piece.text for piece in self._pieces if piece.kind is PieceKind.TEXT)
         return any("\r" in text for text in (self._piece[self._given :], *texts))
 
     def drop(self) -> None:
@@ -226,7 +230,7 @@ class KeyStream:
 
         A sequence that has begun continues: otherwise its second half would be read as typed text.
         """
-        pieces = [piece.text if piece.kind is Kind.TEXT else "\0" for piece in self._pieces]
+        pieces = [piece.text if piece.kind is PieceKind.TEXT else "\0" for piece in self._pieces]
         text = self._piece[self._given :] + "".join(pieces)
         self._pieces.clear()
         self._waiting, self._piece, self._given = 0, "", 0
@@ -251,23 +255,23 @@ class KeyStream:
         self._put(self._split(data))
         self._watch_paste()
         self._wait_for_more()
-        if self._waiting > MOST:
+        if self._waiting > LONGEST_PASTE:
             self.drop()
             self._warn("too much input at once; all of it was dropped")
 
-    def _split(self, data: bytes) -> list[Piece]:
-        found = []
+    def _split(self, data: bytes) -> list[InputPiece]:
+        events = []
         for piece in self._splitter.split(self._decode(data)):
-            if piece.kind in (Kind.PASTE, Kind.TOO_LONG) and self._old_paste:
+            if piece.kind in (PieceKind.PASTE, PieceKind.TOO_LONG) and self._old_paste:
                 self._old_paste = False
                 self._warn("the rest of the paste in which the stop came was dropped, too")
-            elif piece.kind is Kind.TOO_LONG:
-                self._warn(f"a paste of more than {MOST} characters was dropped")
+            elif piece.kind is PieceKind.TOO_LONG:
+                self._warn(f"a paste of more than {LONGEST_PASTE} characters was dropped")
             else:
-                found.append(piece)
-        return found
+                events.append(piece)
+        return events
 
-    def _put(self, pieces: Iterable[Piece]) -> None:
+    def _put(self, pieces: Iterable[InputPiece]) -> None:
         for piece in pieces:
             self._pieces.append(piece)
             self._waiting += len(piece.text)
@@ -279,7 +283,7 @@ class KeyStream:
         if self._stall is not None:
             self._stall.cancel()
         self._stalled = False
-        self._stall = self._loop.call_later(STALLED, self._stalls) if self._splitter.pasting else None
+        self._stall = self._loop.call_later(PASTE_TIMEOUT, self._stalls) if self._splitter.pasting else None
 
     def _stalls(self) -> None:
         self._stalled = True
@@ -294,7 +298,7 @@ class KeyStream:
 
     def _work(self) -> None:
         self._scheduled = False
-        until = time.monotonic() + SLICE
+        until = time.monotonic() + LONGEST_SPLIT_SLICE
         while (event := self._next()) is not None:
             self._emit(event)
             if time.monotonic() > until:
@@ -316,22 +320,22 @@ class KeyStream:
         while (event := next(self._events, None)) is None and self._pieces:
             piece = self._pieces.popleft()
             self._waiting -= len(piece.text)
-            self._piece, self._given = (piece.text if piece.kind is Kind.TEXT else ""), 0
+            self._piece, self._given = (piece.text if piece.kind is PieceKind.TEXT else ""), 0
             self._events = iter(self._events_of(piece))
         self._given += 1
         return event
 
-    def _events_of(self, piece: Piece) -> Iterable[Message]:
-        if piece.kind is Kind.ESCAPE:
+    def _events_of(self, piece: InputPiece) -> Iterable[Message]:
+        if piece.kind is PieceKind.ESCAPE:
             return [events.Key("escape", "\x1b")]
-        if piece.kind is Kind.PASTE:
+        if piece.kind is PieceKind.PASTE:
             return [events.Paste(piece.text.replace("\x00", ""))]
-        if piece.kind is Kind.TEXT:
+        if piece.kind is PieceKind.TEXT:
             return self._parser.feed(piece.text)
-        found = list(self._parser.feed(piece.text))
-        if not found:
+        messages = list(self._parser.feed(piece.text))
+        if not messages:
             self._parser = XTermParser()  # the parser does not know the sequence, and would wait for more of it
-        return found
+        return messages
 
     def _alone(self) -> None:
         """Decide that an Escape is alone, because nothing follows it."""

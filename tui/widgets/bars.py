@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 from textual import events
 
-from multidrop.shell.stop_report import Tally, headline, words
+from multidrop.shell.stop_report import FateTally, headline, words
 from multidrop.tui.keymap import read_key
-from multidrop.tui.readout import State
+from multidrop.tui.readout import ReadoutState
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Lines, Row, Span, width_of
 
@@ -24,7 +24,7 @@ TRYING = "; trying again"
 """The end of a reason for a loss while the bus is being tried again."""
 
 
-def banner_row(tally: Tally | None, lost: str, width: int) -> Row:
+def banner_row(tally: FateTally | None, lost: str, width: int) -> Row:
     """The text of the banner; an empty row if there is none. It is red until every drive was read at rest.
 
     `tally` is what is known since a latched stop, `lost` the reason of a lost bus. A tally of drives that stood before
@@ -114,20 +114,20 @@ class Footer(Lines):
         shown = key_at(self.rows[0], event.x) if self.rows else ""
         if shown.startswith("/") and len(shown) > 1:
             await self.run_action(f"act.begin_line({shown!r})")
-        elif found := self.screen.active_bindings.get(read_key(shown)):
-            if found.binding.action.partition("(")[0] in MOVING:
+        elif bound := self.screen.active_bindings.get(read_key(shown)):
+            if bound.binding.action.partition("(")[0] in MOVING:
                 self.notify(f"Nothing was sent: a click moves nothing; press {shown}", timeout=4)
                 return
-            await self.app.run_action(found.binding.action, found.node)
+            await self.app.run_action(bound.binding.action, bound.node)
 
 
 NAME = " multidrop  "
-TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE, State.DIFFERS})
-LONGEST = 24
+TROUBLE = frozenset({ReadoutState.LOST, ReadoutState.SILENT, ReadoutState.TROUBLE, ReadoutState.DIFFERS})
+LONGEST_TAB_NAME = 24
 """Greatest width of a name in a tab."""
 SHORT = 10
 """The same beside a tab with words."""
-LEAST = 3
+SHORTEST_TAB_NAME = 3
 """The same where there is no room for more."""
 
 
@@ -137,7 +137,7 @@ class Tab:
 
     number: int
     name: str
-    state: State
+    state: ReadoutState
     selected: bool
     old: bool = False
     """The state may be outdated."""
@@ -150,12 +150,12 @@ class Tab:
 
     @property
     def role(self) -> str:
-        return "dim" if self.old and self.state is not State.LOST else self.state.role
+        return "dim" if self.old and self.state is not ReadoutState.LOST else self.state.role
 
 
 def tab_spans(tab: Tab) -> list[Span]:
     """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST)} ", f"{tab.state.sign} {tab.state.word:<6}")
+    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST_TAB_NAME)} ", f"{tab.state.sign} {tab.state.word:<6}")
 
 
 def _named(tab: Tab, name: str = "") -> list[Span]:
@@ -186,7 +186,7 @@ def _cuts(tabs: Sequence[Tab], width: int) -> list[str]:
 
 def _longest(tabs: Sequence[Tab], shown: Callable[[Tab, str], list[Span]], least: int, room: int) -> list[Span]:
     """The tabs with names as long as they all fit; an empty list where names of the `least` width do not."""
-    for width in range(LONGEST, least - 1, -1):
+    for width in range(LONGEST_TAB_NAME, least - 1, -1):
         spans = [span for tab, name in zip(tabs, _cuts(tabs, width), strict=True) for span in shown(tab, name)]
         if width_of(spans) <= room:
             return spans
@@ -225,7 +225,9 @@ def _folded(tabs: Sequence[Tab], alike: Callable[[Tab, Tab], bool]) -> list[Span
 
 def _run(run: Sequence[Tab]) -> list[Span]:
     """` 4-12 ■`, with the sign of the one that moves if any does, or else of one that runs a program."""
-    shown = next((tab for state in (State.MOVING, State.DWELL) for tab in run if tab.state is state), run[0])
+    shown = next(
+        (tab for state in (ReadoutState.MOVING, ReadoutState.DWELL) for tab in run if tab.state is state), run[0]
+    )
     return [(f" {run[0].number}-{run[-1].number} ", "text"), (shown.state.sign, shown.role)]
 
 
@@ -255,7 +257,7 @@ def tabs_row(tabs: Sequence[Tab], room: int) -> list[Span]:
         lambda: _each(tabs, tab_spans),
         lambda: _longest(tabs, lambda tab, name: tab_spans(tab) if tab.selected else _named(tab, name), SHORT, room),
         lambda: _longest(tabs, _named, SHORT, room),
-        lambda: _longest(tabs, _tight, LEAST, room),
+        lambda: _longest(tabs, _tight, SHORTEST_TAB_NAME, room),
         lambda: _each(tabs, _small),
         lambda: _folded(tabs, lambda one, other: one.state is other.state),
         lambda: _folded(tabs, lambda one, other: True),
@@ -305,8 +307,8 @@ def tab_at(row: Row, x: int) -> int | None:
     number, end = None, 0
     for text, _ in row:
         end += width_of([(text, "")])
-        if found := re.match(r"\s*(\d+)(?:[\s-]|$)", text):
-            number = int(found[1])
+        if match := re.match(r"\s*(\d+)(?:[\s-]|$)", text):
+            number = int(match[1])
         elif not text.strip() or re.fullmatch(r" [✗+]\d+", text):
             number = None
         if x < end:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 LISTED = 8
 """Number of completions in view."""
-LONGEST = 200
+LONGEST_COMPLETED_LINE = 200
 """Length in characters from which no line is looked up: no command is that long."""
 
 
@@ -78,7 +78,7 @@ class Recall:
 
 
 @dataclass
-class Listing:
+class CompletionListing:
     """The completions of the typed text, and the one that is in the line."""
 
     typed: str = ""
@@ -107,23 +107,23 @@ class Listing:
         first = max(0, min(self.chosen - LISTED // 2, len(self.found) - LISTED))
         rows: list[Row] = []
         for number in range(first, min(first + LISTED, len(self.found))):
-            each = self.found[number]
-            word = fit(f" {each.text}", 14) + " "
+            completion = self.found[number]
+            word = fit(f" {completion.text}", 14) + " "
             more = f" {number + 1}/{len(self.found)}" if number == first + LISTED - 1 else ""
-            meaning = fit(each.meaning, width - 15 - len(more) - 1) + more + " "
+            meaning = fit(completion.meaning, width - 15 - len(more) - 1) + more + " "
             chosen = number == self.chosen
             rows.append(((word, "focus" if chosen else "strong"), (meaning, "focus" if chosen else "dim")))
         return rows
 
 
 @dataclass
-class Draft:
+class LineDraft:
     """A line that is being edited: its text, its cursor, its completions, its place in history."""
 
     recall: Recall
     text: str = ""
     selection: Selection = field(default_factory=lambda: Selection.cursor(0))
-    listing: Listing = field(default_factory=Listing)
+    listing: CompletionListing = field(default_factory=CompletionListing)
 
 
 class Entry(Input):
@@ -158,7 +158,7 @@ class Entry(Input):
     ) -> None:
         super().__init__(id=id, compact=True, select_on_focus=False)
         self.cursor_blink = False
-        self.listing = Listing()
+        self.listing = CompletionListing()
         self._complete, self._lines = complete, lines
         self._typed, self._pasted = typed, pasted
         self._recall = Recall(lines)
@@ -167,7 +167,7 @@ class Entry(Input):
 
     def put(self, text: str) -> None:
         """Put text into the line without looking up completions for it."""
-        self.listing = Listing(text)
+        self.listing = CompletionListing(text)
         self._show(text)
 
     def _show(self, text: str) -> None:
@@ -179,17 +179,17 @@ class Entry(Input):
     def unsent(self) -> str:
         return "" if self._submitted else self.value
 
-    def exchange(self, draft: Draft | None = None) -> Draft:
+    def exchange(self, draft: LineDraft | None = None) -> LineDraft:
         """Take up another line, an empty one by default, and return the current one."""
-        before = Draft(self._recall, self.unsent, self.selection, self.listing)
-        draft = draft or Draft(Recall(self._lines))
+        before = LineDraft(self._recall, self.unsent, self.selection, self.listing)
+        draft = draft or LineDraft(Recall(self._lines))
         self._recall, self.listing = draft.recall, draft.listing
         self.value, self.selection = draft.text, draft.selection
         self._submitted = False
         self.post_message(self.Edited())
         return before
 
-    def take_in(self, draft: Draft) -> None:
+    def take_in(self, draft: LineDraft) -> None:
         """Insert another line at the cursor, with its own cursor."""
         start = min(self.selection)
         self.replace(draft.text, *self.selection)
@@ -204,13 +204,13 @@ class Entry(Input):
             self.listing = self._look_up(self.value)
         self.post_message(self.Edited())
 
-    def _look_up(self, text: str) -> Listing:
-        if not text.strip() or not self.cursor_at_end or len(text) > LONGEST:
-            return Listing(text)
-        found = list(self._complete(text))
-        if len(found) == 1 and text[: found[0].start] + found[0].text == text:
-            found = []
-        return Listing(text, found)
+    def _look_up(self, text: str) -> CompletionListing:
+        if not text.strip() or not self.cursor_at_end or len(text) > LONGEST_COMPLETED_LINE:
+            return CompletionListing(text)
+        completions = list(self._complete(text))
+        if len(completions) == 1 and text[: completions[0].start] + completions[0].text == text:
+            completions = []
+        return CompletionListing(text, completions)
 
     async def action_submit(self) -> None:
         self._submitted = True
@@ -228,8 +228,8 @@ class Entry(Input):
     def action_complete(self, direction: int) -> None:
         """Put the next completion into the line on Tab; on an empty line, list all words."""
         text = self.value
-        if (text != self.listing.line or not self.listing.open) and len(text) <= LONGEST:
-            self.listing = Listing(text, list(self._complete(text, self._learned)))
+        if (text != self.listing.line or not self.listing.open) and len(text) <= LONGEST_COMPLETED_LINE:
+            self.listing = CompletionListing(text, list(self._complete(text, self._learned)))
         if self.listing.open:
             self._show(self.listing.step(direction))
 
@@ -240,7 +240,7 @@ class Entry(Input):
             self.post_message(self.Edited())
 
     def action_fold(self) -> None:
-        self.listing = Listing(self.value)
+        self.listing = CompletionListing(self.value)
         self.post_message(self.Edited())
 
     async def on_paste(self, event: events.Paste) -> None:

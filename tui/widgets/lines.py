@@ -33,12 +33,12 @@ PLAIN_ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "e
 ROLES = (*PLAIN_ROLES, *SERIES)
 
 
-class Link(str):
+class ActionText(str):
     """A text with an action, which a click anywhere on its row runs."""
 
     action: str
 
-    def __new__(cls, text: str, action: str) -> Link:
+    def __new__(cls, text: str, action: str) -> ActionText:
         link = super().__new__(cls, text)
         link.action = action
         return link
@@ -114,7 +114,7 @@ class Lines(Widget):
         """The style of a role under the current theme."""
         style = self._styles_of.get(role)
         if style is None:
-            holder = next((each for screen in self.app.screen_stack for each in screen.query(Roles)), None)
+            holder = next((roles for screen in self.app.screen_stack for roles in screen.query(Roles)), None)
             if holder is None:
                 return self.rich_style
             try:
@@ -129,15 +129,15 @@ class Lines(Widget):
         if self._strips_for != width or len(self._strips) > MOST_STRIPS:
             self._strips.clear()
             self._strips_for = width
-        found = self._strips.get(row)
-        if found is None:
+        strip = self._strips.get(row)
+        if strip is None:
             segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
             room = width - sum(cell_len(segment.text) for segment in segments)
             if room > 0:
                 segments.append(Segment(" " * room, self.style_of("text")))
-            found = Strip(segments).crop(0, width) if room < 0 else Strip(segments, width)
-            self._strips[row] = found
-        return found
+            strip = Strip(segments).crop(0, width) if room < 0 else Strip(segments, width)
+            self._strips[row] = strip
+        return strip
 
     def shown(self) -> Sequence[Row]:
         """The rows, from the top of the widget. Other rows are another object."""
@@ -167,7 +167,7 @@ class Lines(Widget):
 
     async def on_click(self, event: events.Click) -> None:
         row = self.rows[event.y] if event.y < len(self.rows) else ()
-        link = next((text for text, _ in row if isinstance(text, Link)), None)
+        link = next((text for text, _ in row if isinstance(text, ActionText)), None)
         if link is not None:
             await self.run_action(link.action)
 

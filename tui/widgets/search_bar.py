@@ -18,16 +18,16 @@ from multidrop.base.text import counted
 from multidrop.tui.key_table import Keyed, hint
 from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
 from multidrop.tui.widgets.transcript import Transcript
-from multidrop.tui.widgets.viewport import Picked, Search
+from multidrop.tui.widgets.viewport import Picked, RecordSearch
 
-LONGEST = 200
+LONGEST_SEARCH_TEXT = 200
 """Characters of a searched text."""
 MOST_COPIED = 50_000
 """Characters that terminals take into their clipboard."""
 FIND = " find ▸ "
-COUNTS = 17
+COUNTS_WIDTH = 17
 """Width of `50000 of 50000`."""
-LEAST = 22
+LEAST_ENTRY_WIDTH = 22
 """Width of the searched text and its label at least."""
 PICK_KEYS = (f"{hint('pick')} ", "Enter copy   Esc close ", "Enter ")
 KEYS = (f"   {hint('find')} ", "   Esc close ", "")
@@ -41,7 +41,7 @@ class FindField(Keyed, Input):
     """As of the input line: a longer text changes no layout."""
 
     def __init__(self, edited: Callable[[str], None], act: Callable[[str], None]) -> None:
-        super().__init__(id="find", compact=True, max_length=LONGEST, select_on_focus=False)
+        super().__init__(id="find", compact=True, max_length=LONGEST_SEARCH_TEXT, select_on_focus=False)
         self.cursor_blink = False
         self._edited, self._act = edited, act
 
@@ -68,7 +68,7 @@ class PickBar(Keyed, Lines, can_focus=True):
         self._act(what)
 
 
-class Reader(Horizontal):
+class SearchBar(Horizontal):
     """The row. `leave` gives the keys back to the input line."""
 
     def __init__(self, leave: Callable[[], None], *, id: str | None = None) -> None:
@@ -96,7 +96,7 @@ class Reader(Horizontal):
             self._act("older")
             return
         self.close()
-        transcript.search = Search(transcript.sight)
+        transcript.search = RecordSearch(transcript.sight)
         self._begin(transcript, picking=False)
         self._label.put([((FIND, "accent"),)])
         self._field.value = ""
@@ -193,14 +193,14 @@ class Reader(Horizontal):
         elif transcript.picked is not None:
             left = ((" copy ▸ ", "accent"), (size_of(transcript.picked), "strong"))
             room = self.size.width - width_of(left)
-            keys = next((each for each in PICK_KEYS if len(each) + 1 < room), "")
+            keys = next((key for key in PICK_KEYS if len(key) + 1 < room), "")
             self._bar.put([spread(left, ((keys, "dim"),), self.size.width)])
 
-    def _found(self, search: Search) -> Row:
+    def _found(self, search: RecordSearch) -> Row:
         place, count = search.place
         counts = f"{place} of {count}" if count else "nothing" if search.text else ""
-        keys = next(each for each in KEYS if not each or len(each) + COUNTS + LEAST <= self.size.width)
-        room = len(keys) + COUNTS
+        keys = next(key for key in KEYS if not key or len(key) + COUNTS_WIDTH + LEAST_ENTRY_WIDTH <= self.size.width)
+        room = len(keys) + COUNTS_WIDTH
         self._words.styles.width = room
         return spread((), ((counts, "strong" if count or not search.text else "error"), (keys, "dim")), room)
 

@@ -23,7 +23,7 @@ from textual.filter import LineFilter
 from textual.theme import BUILTIN_THEMES, Theme
 
 from multidrop.base.text import visible
-from multidrop.shell.configuration import Look
+from multidrop.shell.configuration import ScreenSettings
 from multidrop.tui.curves.raster import INKS, Ink
 
 COLOURS = (
@@ -137,10 +137,10 @@ def shown_as(text: str, signs: Signs) -> str:
     """Write a text in the characters that a terminal can show, in as many cells."""
     if signs is Signs.FULL or text.isascii():
         return text
-    found = text.translate(TABLES[signs])
-    if signs is Signs.BOXES or found.isascii():
-        return found
-    return "".join(each if each.isascii() else "?" * cell_len(each) for each in found)
+    shown = text.translate(TABLES[signs])
+    if signs is Signs.BOXES or shown.isascii():
+        return shown
+    return "".join(character if character.isascii() else "?" * cell_len(character) for character in shown)
 
 
 class SignFilter(LineFilter):
@@ -164,12 +164,12 @@ class Dressed(App[int]):
     ENABLE_COMMAND_PALETTE = False
     """Textual's own palette; ours is a `Search`, in which keys keep their order."""
 
-    def __init__(self, look: Look, driver: type[Driver] | None = None) -> None:
+    def __init__(self, look: ScreenSettings, driver: type[Driver] | None = None) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.signs = SignFilter(signs_for(look.signs, os.environ))
 
-    def dress(self, look: Look) -> None:
+    def dress(self, look: ScreenSettings) -> None:
         """Use the theme that a configuration names, else one that fits the terminal."""
         for theme in THEMES:
             self.register_theme(theme)

@@ -13,13 +13,13 @@ from rich.cells import cell_len, chop_cells
 from textual import events
 
 from multidrop.base.text import counted
-from multidrop.shell.raw import Form
+from multidrop.shell.raw import ByteForm
 from multidrop.shell.roles import Filter
 from multidrop.shell.streams.event_printer import laid_out
 from multidrop.tui.screen_model import Record
 from multidrop.tui.text import at_words, fit, visible
 from multidrop.tui.widgets.lines import Lines, Row, Span, spread, width_of
-from multidrop.tui.widgets.viewport import Picked, Records, Search, Sight
+from multidrop.tui.widgets.viewport import Picked, Records, RecordSearch, VisibleRecords
 
 MARKS = {
     ">": ("›", "strong"),
@@ -38,14 +38,14 @@ VERBATIM = frozenset({">", "»", "<", "", "↑", "↓"})
 """Marks of records in a drive's own language, where every space counts."""
 DATED = frozenset(">»<↑↓.!")
 """Marks of records that show the time of day; a reply follows the line that it answers."""
-ADDRESS, LONGEST = 3, 12
+ADDRESS, WIDEST_LINE_NAME = 3, 12
 """Least and greatest width of the name of a drive in cells."""
 CLOCK = 8
 """Width of a time in cells."""
 BYTES = "↑↓"
 """Marks of bytes, which have no address: their time takes its place, and has milliseconds."""
 HEX = re.compile(r"(?:[0-9A-F]{2} )*[0-9A-F]{2}")
-HEX_AT = Form.BOTH.value[2] + 1
+HEX_AT = ByteForm.BOTH.value[2] + 1
 """The column of the hex beside its text."""
 
 
@@ -131,9 +131,9 @@ def _split(part: str, plain: str, text: str, role: str) -> list[Span]:
     folded, at, spans = part.casefold(), 0, list[Span]()
     if len(folded) != len(part):
         return [(part, plain)]  # a letter that folds to two
-    while (found := folded.find(text, at)) >= 0:
-        spans += [(part[at:found], plain), (part[found : found + len(text)], role)]
-        at = found + len(text)
+    while (cut := folded.find(text, at)) >= 0:
+        spans += [(part[at:cut], plain), (part[cut : cut + len(text)], role)]
+        at = cut + len(text)
     return [span for span in [*spans, (part[at:], plain)] if span[0]]
 
 
@@ -148,9 +148,9 @@ class Transcript(Lines, can_focus=False):
         super().__init__()
         self._has_foot = foot
         self.records = Records()
-        self.sight = Sight(self.records)
+        self.sight = VisibleRecords(self.records)
         self.clocks = Clocks(times, clock)
-        self.search: Search | None = None
+        self.search: RecordSearch | None = None
         self.picked: Picked | None = None
         self._view: list[Row] | None = None
         self._made: dict[int, list[Row]] = {}
@@ -168,8 +168,10 @@ class Transcript(Lines, can_focus=False):
         """Take in records, oldest first; `show_new` shows them."""
         new = list(records)
         self.records.take(new)
-        names = max((len(each.name) for each in new), default=0)
-        self.clocks = self.clocks._replace(start=self.records.began, names=max(self.clocks.names, min(names, LONGEST)))
+        names = max((len(record.name) for record in new), default=0)
+        self.clocks = self.clocks._replace(
+            start=self.records.began, names=max(self.clocks.names, min(names, WIDEST_LINE_NAME))
+        )
         self._unshown = self._unshown or bool(new)
 
     def show_new(self) -> None:
@@ -278,8 +280,8 @@ class Transcript(Lines, can_focus=False):
             return rows
         here = self.search is not None and self.search.at == number
         role = "focus" if here else "found"
-        found = [found_in(row, text, self.clocks.gutter, role) for row in rows]
-        return [marked(found[0], "►" if here else "•", "accent"), *found[1:]]
+        decorated = [found_in(row, text, self.clocks.gutter, role) for row in rows]
+        return [marked(decorated[0], "►" if here else "•", "accent"), *decorated[1:]]
 
     def _foot(self, width: int) -> list[Row]:
         """The last row, while the view shows less than everything up to the newest line."""

@@ -13,7 +13,7 @@ from itertools import islice
 
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.roles import EVERYTHING, Filter
-from multidrop.tui.screen_model import KEPT, Record
+from multidrop.tui.screen_model import MOST_FRESH_RECORDS, Record
 
 # The records of one bus: the last ones, by number, as many as fit into a bound of lines and of text.
 #
@@ -28,7 +28,7 @@ MOST_TEXT = 8_000_000
 class Records:
     """The kept records. Taking one in costs the same whatever is kept."""
 
-    def __init__(self, most: int = KEPT, text: int = MOST_TEXT) -> None:
+    def __init__(self, most: int = MOST_FRESH_RECORDS, text: int = MOST_TEXT) -> None:
         self._kept: deque[Record] = deque()
         self._most, self._room = most, text
         self.taken = 0
@@ -105,7 +105,7 @@ Chooser = Callable[[int, Record], tuple[int, ...]]
 """Chooses records: given each one in turn, it returns the numbers to add, of that one or of earlier ones."""
 
 
-class Shown:
+class RecordFilter:
     """Chooses the records that a filter shows.
 
     What a person types from record `since` on is shown with its replies, whatever the filter says.
@@ -141,7 +141,7 @@ def holding(text: str, records: Records, shown: Chooser | None) -> Chooser:
     def holds(number: int, record: Record) -> tuple[int, ...]:
         if shown is None:
             return (number,) if wanted in record.text.casefold() else ()
-        return tuple(each for each in shown(number, record) if wanted in records[each].text.casefold())
+        return tuple(line for line in shown(number, record) if wanted in records[line].text.casefold())
 
     return holds
 
@@ -162,16 +162,16 @@ class Index:
             del self._numbers[: bisect_left(self._numbers, first)]
         if self._seen < self._records.taken:
             for number, record in self._records.since(self._seen):
-                for each in self._choose(number, record):
-                    if not self._numbers or each > self._numbers[-1]:
-                        self._numbers.append(each)
-                    elif each >= first and self._numbers[bisect_left(self._numbers, each)] != each:
-                        insort(self._numbers, each)
+                for index in self._choose(number, record):
+                    if not self._numbers or index > self._numbers[-1]:
+                        self._numbers.append(index)
+                    elif index >= first and self._numbers[bisect_left(self._numbers, index)] != index:
+                        insort(self._numbers, index)
             self._seen = self._records.taken
         return self._numbers
 
 
-class Sight:
+class VisibleRecords:
     """The records that are shown, and the one at the bottom."""
 
     def __init__(self, records: Records) -> None:
@@ -198,9 +198,9 @@ class Sight:
         shown = self.shown()
         self._index = Index(self.records, shown) if shown is not None else None
 
-    def shown(self) -> Shown | None:
+    def shown(self) -> RecordFilter | None:
         """Make what chooses the shown records, from the first one on; None: all are shown."""
-        return Shown(self.filter, self._filtered_from) if self.filter else None
+        return RecordFilter(self.filter, self._filtered_from) if self.filter else None
 
     @property
     def following(self) -> bool:
@@ -278,10 +278,10 @@ class Sight:
             self._bottom = numbers[min(max(end, 1), len(numbers)) - 1]
 
 
-class Search:
+class RecordSearch:
     """A search in what is shown; it grows with what arrives."""
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: VisibleRecords) -> None:
         self._sight = sight
         self._index: Index | None = None
         self.text = ""
@@ -333,7 +333,7 @@ class Search:
 class Picked:
     """Lines picked to be copied: those between two records."""
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: VisibleRecords) -> None:
         self._sight = sight
         numbers = sight.numbers
         self.cursor = numbers[sight.end - 1] if sight.end else 0

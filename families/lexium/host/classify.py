@@ -12,7 +12,7 @@ from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import (
     Argument,
     LineError,
-    Name,
+    NameTerm,
     Number,
     Statement,
     Text,
@@ -33,7 +33,7 @@ from multidrop.families.lexium.manual.groups import (
     SIGNS_OF_FAILURE,
     STEPPING,
 )
-from multidrop.families.lexium.manual.mnemonic import Form, Mnemonic
+from multidrop.families.lexium.manual.mnemonic import FormKind, Mnemonic
 from multidrop.families.lexium.manual.statements import device_name
 from multidrop.families.lexium.manual.table import lookup
 
@@ -42,7 +42,7 @@ BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
 
 
 @dataclass(frozen=True)
-class Setting:
+class LineSetting:
     """A communication setting that a line makes. `value` is None where the line does not show it (`EM=R1`)."""
 
     name: str
@@ -52,34 +52,34 @@ class Setting:
 @lru_cache(maxsize=256)
 def word_of(text: str) -> tuple[str, str]:
     """Split a line into its mnemonic, in capitals, and the rest."""
-    found = WORD.match(text)
-    return (found.group(1).upper(), found.group(2).strip()) if found else ("", text.strip())
+    match = WORD.match(text)
+    return (match.group(1).upper(), match.group(2).strip()) if match else ("", text.strip())
 
 
 @lru_cache(maxsize=256)
-def setting_of(text: str) -> Setting | None:
+def setting_of(text: str) -> LineSetting | None:
     """Find the communication setting that a line makes; None for any other line and for a value that drives refuse."""
     statement = parsed(text)
     if statement is None:  # a drive may find a setting in a line that this grammar does not parse
         word, rest = word_of(text)
-        return Setting(word) if word in RESTORING or (word in FORM_OF_LINES and rest) else None
+        return LineSetting(word) if word in RESTORING or (word in FORM_OF_LINES and rest) else None
     word, arguments = statement.word, statement.arguments
     if word in RESTORING:
-        return Setting(word)
-    if word in STEPPING and arguments and isinstance(arguments[0], Name) and arguments[0].word in FORM_OF_LINES:
-        return Setting(arguments[0].word)
+        return LineSetting(word)
+    if word in STEPPING and arguments and isinstance(arguments[0], NameTerm) and arguments[0].word in FORM_OF_LINES:
+        return LineSetting(arguments[0].word)
     if word not in FORM_OF_LINES or not arguments:
         return None
     value = _literal(word, arguments[0]) if len(arguments) == 1 else None
     if value is None:
-        return Setting(word)
-    return Setting(word, value) if _takes(word, value) else None
+        return LineSetting(word)
+    return LineSetting(word, value) if _takes(word, value) else None
 
 
 def _takes(word: str, value: str) -> bool:
     """Whether drives accept a literal for a communication setting; the literal of DN is a name that they take."""
     row = lookup(word)
-    return row is not None and (row.setup.form is Form.TEXT or row.accepts(int(value))) and value != ""
+    return row is not None and (row.setup.form is FormKind.TEXT or row.accepts(int(value))) and value != ""
 
 
 def _literal(word: str, argument: Argument | None) -> str | None:
@@ -157,14 +157,15 @@ def vouched(text: str, product: str) -> bool:
         return False
     row = lookup(statement.word, product)
     if statement.word == "PR":
-        names = [each for each in statement.arguments if not isinstance(each, (Text, Number))]
-        rows = [lookup(each.word, product) if isinstance(each, Name) else None for each in names]
-        return all(each is not None and each.access != "-" for each in rows)
+        names = [argument for argument in statement.arguments if not isinstance(argument, (Text, Number))]
+        rows = [lookup(name.word, product) if isinstance(name, NameTerm) else None for name in names]
+        return all(mnemonic is not None and mnemonic.access != "-" for mnemonic in rows)
     return (
         row is not None
         and len(statement.arguments) <= 1
         and all(
-            isinstance(each, Number) and row.accepts(each.value) and row.access != "RO" for each in statement.arguments
+            isinstance(argument, Number) and row.accepts(argument.value) and row.access != "RO"
+            for argument in statement.arguments
         )
     )
 
@@ -176,8 +177,8 @@ def refused_by_tables(text: str, product: str) -> bool:
     row = lookup(statement.word, product) if statement is not None else None
     if statement is None or row is None:
         return True
-    numbers = [each.value for each in statement.arguments[:1] if isinstance(each, Number)]
-    return any(not (row.accepts(each) or row.accepts(each, encoder=True)) for each in numbers)
+    numbers = [argument.value for argument in statement.arguments[:1] if isinstance(argument, Number)]
+    return any(not (row.accepts(number) or row.accepts(number, encoder=True)) for number in numbers)
 
 
 OF_DEFINITIONS = frozenset({E.NAME_EXISTS, E.NAME_IS_COMMAND, E.NAME_TABLE_FULL})
@@ -249,7 +250,7 @@ def written_word(text: str) -> str:
     if statement is None or not statement.arguments or statement.word == "PR":
         return ""
     first = statement.arguments[0]
-    return first.word if statement.word in STEPPING and isinstance(first, Name) else statement.word
+    return first.word if statement.word in STEPPING and isinstance(first, NameTerm) else statement.word
 
 
 def target_of(text: str, rest: int | None) -> int | None:
@@ -288,10 +289,10 @@ def print_form(text: str) -> str | None:
     if statement is None:
         return None
     pieces: list[str] = []
-    arguments = [each for each in statement.arguments if each is not None]
+    arguments = [argument for argument in statement.arguments if argument is not None]
     while arguments:
         item = arguments.pop(0)
-        if isinstance(item, Name) and item.word in OPTIONED and arguments and isinstance(arguments[0], Number):
+        if isinstance(item, NameTerm) and item.word in OPTIONED and arguments and isinstance(arguments[0], Number):
             arguments.pop(0)
         pieces.append(_item_form(item))
     # Join the parts so that no two can match the same characters: a long line then matches fast.
@@ -311,13 +312,13 @@ def print_form(text: str) -> str | None:
 def reads_error(text: str) -> bool:
     """Whether a line prints ER and nothing else, which clears the error."""
     statement = _printing(text)
-    return statement is not None and [getattr(each, "word", "") for each in statement.arguments] == ["ER"]
+    return statement is not None and [getattr(argument, "word", "") for argument in statement.arguments] == ["ER"]
 
 
 def with_item(text: str, item: str) -> str | None:
     """Append an item to the values of a PR; None where it prints no value, or is not a PR of one line."""
     statement = _printing(text)
-    if statement is None or all(isinstance(each, (Text, Number)) for each in statement.arguments):
+    if statement is None or all(isinstance(argument, (Text, Number)) for argument in statement.arguments):
         return None
     return f"{text.rstrip().removesuffix(';').rstrip()},{item}{';' * statement.quiet}"
 
@@ -328,11 +329,11 @@ def plain_form(text: str) -> str | None:
     The repetition of the line in EM=0 does not match it.
     """
     statement = _printing(text)
-    if statement is None or statement.quiet or not isinstance(statement.arguments[-1], Name):
+    if statement is None or statement.quiet or not isinstance(statement.arguments[-1], NameTerm):
         return None
-    words = [each.word for each in statement.arguments if isinstance(each, Name)]
+    words = [argument.word for argument in statement.arguments if isinstance(argument, NameTerm)]
     rows = [lookup(word) for word in words if word not in SIGNS_OF_FAILURE]
-    plain = all(isinstance(each, (Name, Text)) for each in statement.arguments)
+    plain = all(isinstance(argument, (NameTerm, Text)) for argument in statement.arguments)
     whole = len(rows) == len(words) and all(row is not None and _is_whole_number(row) for row in rows)
     return print_form(text) if plain and whole else None
 
@@ -341,8 +342,8 @@ def _printing(text: str) -> Statement | None:
     statement = parsed(text)
     if statement is None or statement.word != "PR" or not statement.arguments:
         return None
-    texts = [each.value for each in statement.arguments if isinstance(each, Text)]
-    names = [lookup(each.word) for each in statement.arguments if isinstance(each, Name)]
+    texts = [argument.value for argument in statement.arguments if isinstance(argument, Text)]
+    names = [lookup(argument.word) for argument in statement.arguments if isinstance(argument, NameTerm)]
     broken = any(r"\n" in each for each in texts) or any(row is not None and row.lines for row in names)
     return None if broken else statement
 
@@ -351,14 +352,14 @@ def _item_form(item: object) -> str:
     if isinstance(item, Text):
         # Match a text in quotation marks; units either execute a control code or print it.
         out, at = [], 0
-        for found in _ESCAPE.finditer(item.value):
-            code = _CODES.get(found[1], re.escape(found[1]))
-            out += [re.escape(item.value[at : found.start()]), f"(?:{code}|{re.escape(found[0])})"]
-            at = found.end()
+        for match in _ESCAPE.finditer(item.value):
+            code = _CODES.get(match[1], re.escape(match[1]))
+            out += [re.escape(item.value[at : match.start()]), f"(?:{code}|{re.escape(match[0])})"]
+            at = match.end()
         return "".join((*out, re.escape(item.value[at:])))
     if isinstance(item, Number):
         return re.escape(str(item.value))
-    if isinstance(item, Name):
+    if isinstance(item, NameTerm):
         row = lookup(item.word)
         return INTEGER if row is None or _is_whole_number(row) else FREE
     return FREE

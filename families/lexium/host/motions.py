@@ -35,7 +35,7 @@ from multidrop.families.lexium.manual import errors, groups, points
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Number, Statement, parsed
 from multidrop.families.lexium.manual.groups import RECOUNTING, RESTORING, those
-from multidrop.families.lexium.manual.mnemonic import Mnemonic, Motion, Quantity
+from multidrop.families.lexium.manual.mnemonic import Mnemonic, MotionEffect, WordQuantity
 from multidrop.families.lexium.manual.points import CAUSE
 from multidrop.families.lexium.manual.table import lookup
 
@@ -116,24 +116,24 @@ def effect(state: DriveState, text: str) -> Effect:
 def _of_instruction(row: Mnemonic, statement: Statement, value: int | None) -> Effect | None:
     """What an instruction does to motion; None for other words."""
     match row.motion:
-        case Motion.MOVE:
-            absolute, relative = (value, None) if row.quantity is Quantity.PLACE else (None, value)
+        case MotionEffect.MOVE:
+            absolute, relative = (value, None) if row.quantity is WordQuantity.PLACE else (None, value)
             return Effect(begins=(Move(MoveKind.POSITION, AXIS, absolute, relative),))
-        case Motion.SLEW if value == 0:
+        case MotionEffect.SLEW if value == 0:
             return Effect(ends=ONLY)
-        case Motion.SLEW:  # a velocity that is not a number may be 0
+        case MotionEffect.SLEW:  # a velocity that is not a number may be 0
             return Effect(begins=(Move(MoveKind.VELOCITY, AXIS, endless=value is not None),))
-        case Motion.HOMING if statement.arguments:
+        case MotionEffect.HOMING if statement.arguments:
             return Effect(begins=(Move(MoveKind.HOMING, AXIS),))
-        case Motion.PROGRAM:
+        case MotionEffect.PROGRAM:
             return Effect(begins=(Move(MoveKind.PROGRAM, AXIS),))
-        case Motion.PAUSE:
+        case MotionEffect.PAUSE:
             return Effect(ends=ONLY)
-        case Motion.END:  # a motion that is under way goes on (5.1.35)
+        case MotionEffect.END:  # a motion that is under way goes on (5.1.35)
             return Effect(halts=True)
-        case Motion.RELEASE:
+        case MotionEffect.RELEASE:
             return Effect(clears=True)
-        case Motion.RESUME:  # what PS has paused goes on, perhaps to another target
+        case MotionEffect.RESUME:  # what PS has paused goes on, perhaps to another target
             return Effect(unknown=ONLY, resumes=True)
     return None
 
@@ -167,16 +167,16 @@ class LexiumMotions(Motions, ABC):
         """Raise Inexpressible for a line that no frame can carry, before anything is asked for it."""
 
     def effect(self, text: str) -> Effect:
-        found = effect(self.state, text)
-        if found.begins:
+        own = effect(self.state, text)
+        if own.begins:
             self.carried(text)
-        return found
+        return own
 
     def signs(self) -> Procedure[Signs]:
-        found = yield from self.read(SIGNS)
-        if "EF" in found:
-            self.state.error_flag_read(bool(found["EF"]))
-        return found
+        signs = yield from self.read(SIGNS)
+        if "EF" in signs:
+            self.state.error_flag_read(bool(signs["EF"]))
+        return signs
 
     def old(self, signs: Signs, own: bool) -> Procedure[Signs]:
         state = self.state
@@ -194,26 +194,26 @@ class LexiumMotions(Motions, ABC):
         return None if signs.get("MV") or signs.get("BY") else signs.get("P")
 
     def runs(self, signs: Signs) -> bool:
-        return any(signs.get(each) for each in RUNS)
+        return any(signs.get(sign) for sign in RUNS)
 
     def fails(self, code: int) -> bool:
         return code in errors.BY_ITSELF
 
     def judge(self, axis: str, evidence: Evidence) -> Procedure[Ending | None]:
         state = self.state
-        found = yield from self.read(END)
-        before, move, position = evidence.before, evidence.move, found.get("P")
+        signs = yield from self.read(END)
+        before, move, position = evidence.before, evidence.move, signs.get("P")
         ending = Ending(Outcome.REACHED, AXIS, position)
         if position == 0 and evidence.alone and not evidence.program and LOST in before:
             speed = (yield from self.read((LOST,))).get(LOST, before[LOST])
             if speed != before[LOST]:
                 return restarted(ending, f"{LOST} {before[LOST]} before, {speed} now")
         if move is None:
-            seen = _seen(found, before, ending)
-            return None if seen is ending and (yield from self._makes_up(found)) else seen
+            seen = _seen(signs, before, ending)
+            return None if seen is ending and (yield from self._makes_up(signs)) else seen
         homing, program = move.kind is MoveKind.HOMING, move.kind is MoveKind.PROGRAM
         codes = [code for code in evidence.errors if code in errors.BY_ITSELF]
-        if found.get("EF") and not before.get("EF"):
+        if signs.get("EF") and not before.get("EF"):
             state.error_flag_read(True)
             count = state.errors.count
             if program and (yield from self.handles_errors()):
@@ -232,18 +232,18 @@ class LexiumMotions(Motions, ABC):
                 codes = []
         if codes:
             return _failed(ending, codes[-1], state)
-        if (fault := _new_fault(found, before)) is not None:
+        if (fault := _new_fault(signs, before)) is not None:
             return replace(ending, outcome=fault[0], reason=fault[1])
-        if (yield from self._makes_up(found)):
+        if (yield from self._makes_up(signs)):
             return None
-        if evidence.program or found.get("BY") or found.get("AS") == TORQUE:
+        if evidence.program or signs.get("BY") or signs.get("AS") == TORQUE:
             return ending
         if move.endless:
             return (yield from self._unexplained(ending, evidence))
         target = move.target
-        if target is None or position is None or abs(position - target) <= _tolerance(found):
+        if target is None or position is None or abs(position - target) <= _tolerance(signs):
             return ending
-        if found.get("EE") and found.get("MP"):
+        if signs.get("EE") and signs.get("MP"):
             return None  # position maintenance may still correct it
         return (yield from self._unexplained(ending, evidence))
 
@@ -252,7 +252,7 @@ class LexiumMotions(Motions, ABC):
         free = yield from self.read((*FREE, "DE"))
         if not free.get("DE", 1):
             return replace(ending, outcome=Outcome.POWER, reason="its output bridges are off (DE=0)")
-        if any(free.get(each) for each in FREE):
+        if any(free.get(flag) for flag in FREE):
             return ending
         if not evidence.stopped and (yield from self.program_input()):
             return ending
@@ -300,7 +300,7 @@ def cause(product: str, found: Mapping[str, Value], before: Mapping[str, Value])
         return fault[1]
     if before["EF"]:
         return str(before.get(CAUSE, ""))
-    met = [each for each in points.met(product, {**before, **found}) if each not in points.met(product, before)]
+    met = [point for point in points.met(product, {**before, **found}) if point not in points.met(product, before)]
     return f"{met[0]} is active" if met else ""
 
 

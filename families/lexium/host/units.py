@@ -16,10 +16,10 @@ from multidrop.dialects.codec import Request
 from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.manual.groups import MOVES, RECOUNTING, RESTORING, ROWS, SCALES
-from multidrop.families.lexium.manual.mnemonic import EVERY, MDRIVE_PLUS, Quantity
+from multidrop.families.lexium.manual.mnemonic import EVERY, MDRIVE_PLUS, WordQuantity
 from multidrop.families.lexium.manual.table import lookup
 
-_MEASURES = [(row, Takes[row.quantity.name]) for row in ROWS if row.quantity is not Quantity.NONE]
+_MEASURES = [(row, Takes[row.quantity.name]) for row in ROWS if row.quantity is not WordQuantity.NONE]
 TAKES: Mapping[str, Takes] = {row.name: takes for row, takes in _MEASURES if row.access in ("RW", "WO", "-")}
 """What the number that a line gives to a word measures."""
 READS: Mapping[str, Takes] = {row.name: takes for row, takes in _MEASURES if row.access in ("RW", "RO", "RC")}
@@ -58,11 +58,11 @@ class LexiumUnits(Units):
     words = ", ".join(TAKES)
 
     def fields(self, text: str) -> Sequence[Field]:
-        found = _LINE.fullmatch(text)
-        if found is None:
+        match = _LINE.fullmatch(text)
+        if match is None:
             return ()
-        word = found[1].upper()
-        return (Field("", TAKES[word], *found.span(2), word in MOVES),)
+        word = match[1].upper()
+        return (Field("", TAKES[word], *match.span(2), word in MOVES),)
 
     def disturbs(self, text: str) -> Collection[str]:
         counts = classify.written_word(text) in RECOUNTING
@@ -72,6 +72,6 @@ class LexiumUnits(Units):
         return classify.written_word(request.text) in SCALES or classify.word_of(request.text)[0] in RESTORING
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
-        found = _READ.fullmatch(text)
-        takes = READS.get(found[1].upper()) if found is not None else None
+        match = _READ.fullmatch(text)
+        takes = READS.get(match[1].upper()) if match is not None else None
         return ("", takes) if takes is not None else None

@@ -19,18 +19,18 @@ OUTPUT_TYPES = range(16, 30)
 
 
 def number_in(readings: Readings, name: str) -> int:
-    found = readings.values.get(name, 0)
-    return found if isinstance(found, int) else 0
+    value = readings.values.get(name, 0)
+    return value if isinstance(value, int) else 0
 
 
 def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dict[str, Value]:
     """The set-ups in the lines of PR IS, OS or LS, by number."""
-    found: dict[str, Value] = {}
+    values: dict[str, Value] = {}
     for line in lines:
         row = re.fullmatch(rf"{word} *= *(\d+) *((?:, *-?\d+)+)", line.strip())
         if row is not None and int(row[1]) in numbers:
-            found[f"{word}{int(row[1])}"] = tuple(int(each) for each in row[2].split(",")[1:])
-    return found
+            values[f"{word}{int(row[1])}"] = tuple(int(number) for number in row[2].split(",")[1:])
+    return values
 
 
 class LexiumValues(Values):

@@ -50,7 +50,9 @@ STEPS_PER_MICROSTEP = 10_000
 def source(text: str) -> str:
     """The simplest MDrivePlus that has all words of a program. Raises Diagnostic where it is for other products."""
     for product in SOURCES:
-        wrong = next((each for each in check(text, product) if each.what.startswith("this is a program for")), None)
+        wrong = next(
+            (problem for problem in check(text, product) if problem.what.startswith("this is a program for")), None
+        )
         if wrong is None:
             return product
     assert wrong is not None
@@ -84,10 +86,10 @@ class _Converter:
         mask = sum(1 << n - 1 for n in self.outputs)
         self.calculated: Mapping[str, Callable[[int], object]] = {**CALCULATED, "outputs": lambda bits: bits & mask}
         sizes = [
-            int(each.value)
+            int(argument.value)
             for _, statement in self.read
-            for each in statement.arguments
-            if statement.word == "MS" and isinstance(each, Number)
+            for argument in statement.arguments
+            if statement.word == "MS" and isinstance(argument, Number)
         ]
         self.fastest = min(sizes, default=256) * STEPS_PER_MICROSTEP
         self.changes: list[Problem] = []
@@ -95,13 +97,13 @@ class _Converter:
 
     def _renamed(self, names: frozenset[str]) -> dict[str, str]:
         """New names for those of the program that are words of the product."""
-        taken, found = set(names), dict[str, str]()
+        taken, renamed = set(names), dict[str, str]()
         for name in sorted(names - {AT_POWER_UP}):
             if lookup(name, self.product) is not None:
                 choice = (f"{letter}{digit}" for letter in name[0] + "QXYZ" for digit in range(10))
-                found[name] = next(each for each in choice if each not in taken and lookup(each) is None)
-                taken.add(found[name])
-        return found
+                renamed[name] = next(letter for letter in choice if letter not in taken and lookup(letter) is None)
+                taken.add(renamed[name])
+        return renamed
 
     def convert(self) -> Conversion:
         for line, statement in self.read:
@@ -145,14 +147,14 @@ class _Converter:
             self._refuse(line, f"{line.text} cannot be converted", why)
             return None, ()
         for row in TABLE:
-            found = re.fullmatch(row["form"], canonical) if row["form"] else None
-            if found is None:
+            match = re.fullmatch(row["form"], canonical) if row["form"] else None
+            if match is None:
                 continue
-            why = found.expand(row["why"])
+            why = match.expand(row["why"])
             if not row["becomes"]:
                 self._refuse(line, f"{line.text} cannot be converted", why)
                 return None, ()
-            new = canonical if row["becomes"] == "=" else found.expand(row["becomes"])
+            new = canonical if row["becomes"] == "=" else match.expand(row["becomes"])
             new = _CALCULATION.sub(lambda each: str(self.calculated[each[1]](int(each[2]))), new)
             if new != canonical:
                 return new, [why]
@@ -197,7 +199,7 @@ class _Converter:
 
     def _note(self, line: ProgramLine, why: str) -> None:
         """Name what differs though the line stays: once for each matter."""
-        if why and why not in (each.hint for each in self.changes):
+        if why and why not in (change.hint for change in self.changes):
             self._change(line, f"{line.text} stays", why)
 
     def _change(self, line: ProgramLine, what: str, why: str) -> None:
@@ -217,7 +219,7 @@ def _replaced(text: str, others: Mapping[str, str], names: frozenset[str]) -> st
 
 # The worlds in which a program and its conversion run beside each other.
 
-MOST = 40
+MOST_WORLDS = 40
 """The largest number of worlds; of more they are drawn, the same ones each time."""
 PULSE = (0.5, 1.0)
 SWITCHES = {1: ("home", (-30000, 30000)), 2: ("limit_plus", (40000, None)), 3: ("limit_minus", (-40000, None))}
@@ -231,11 +233,11 @@ def worlds(text: str) -> Iterator[Part]:
     """Yield worlds that differ in what a program's inputs see."""
     lines = program_file.scan(text)[0]
     names = frozenset(line.declares for line in lines if line.declares)
-    read = [each for line in lines if (each := parsed(line.text, names)) is not None]
-    found = list(combinations(*_parts(read)))
-    if len(found) > MOST:
-        found = Random("conversion").sample(found, MOST)
-    for parts in found:
+    read = [statement for line in lines if (statement := parsed(line.text, names)) is not None]
+    drawn = list(combinations(*_parts(read)))
+    if len(drawn) > MOST_WORLDS:
+        drawn = Random("conversion").sample(drawn, MOST_WORLDS)
+    for parts in drawn:
         said = ", ".join(part[0] for part in parts if part[0])
         yield said or "no input active", _merged([part[1] for part in parts]), _merged([part[2] for part in parts])
 
@@ -244,12 +246,12 @@ def _parts(read: Sequence[Statement]) -> Iterator[list[Part]]:
     """Yield for each input the parts that it can add."""
     types = dict.fromkeys(range(1, 5), (0, 0))
     limits = {0, 512, 1023}
-    for each in read:
-        numbers = [int(part.value) for part in each.arguments if isinstance(part, Number)]
-        if re.fullmatch("S[1-4]", each.word) and len(numbers) > 1:
-            types[int(each.word[1])] = (numbers[0], numbers[1])
-        found = re.search(r"I5[<>=]+(\d+)", spelled(each))
-        limits |= {max(int(found[1]) + step, 0) for step in (-1, 0, 1)} if found else set()
+    for statement in read:
+        numbers = [int(part.value) for part in statement.arguments if isinstance(part, Number)]
+        if re.fullmatch("S[1-4]", statement.word) and len(numbers) > 1:
+            types[int(statement.word[1])] = (numbers[0], numbers[1])
+        match = re.search(r"I5[<>=]+(\d+)", spelled(statement))
+        limits |= {max(int(match[1]) + step, 0) for step in (-1, 0, 1)} if match else set()
     for n, (kind, active) in types.items():
         if kind in SWITCHES:
             key, places = SWITCHES[kind]
@@ -264,16 +266,16 @@ def _parts(read: Sequence[Statement]) -> Iterator[list[Part]]:
                 f"input {n} active": [[0.0, n, on]],
                 f"input {n} active for a moment": [[0.0, n, off], [PULSE[0], n, on], [PULSE[1], n, off]],
             }
-            yield [(said, {"inputs": each}, {"inputs": each}) for said, each in levels.items()]
-    if any("I5" in words_of(each) for each in read):
+            yield [(said, {"inputs": level}, {"inputs": level}) for said, level in levels.items()]
+    if any("I5" in words_of(statement) for statement in read):
         few = sorted(limits)
         yield [(f"I5 {c}", {"analog": [[0.0, c]]}, {"analog": [[0.0, c * 4 + 2]]}) for c in few if c <= 1023]
 
 
 def _merged(tables: Sequence[World]) -> World:
     """One table; lists are joined."""
-    found = dict[str, Any]()
+    merged = dict[str, Any]()
     for table in tables:
         for key, value in table.items():
-            found[key] = [*found.get(key, []), *value] if isinstance(value, list) else value
-    return found
+            merged[key] = [*merged.get(key, []), *value] if isinstance(value, list) else value
+    return merged

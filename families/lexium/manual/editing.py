@@ -13,7 +13,7 @@ from multidrop.families.lexium.manual.grammar import NAME_FORM, Token, divided, 
 from multidrop.families.lexium.manual.groups import EVERY_PLACE, TURNING
 from multidrop.families.lexium.manual.help import LANGUAGE, rows_offered
 from multidrop.families.lexium.manual.mnemonic import EVERY, Mnemonic
-from multidrop.families.lexium.manual.program_file import LONGEST, ProgramLine, bare, remark_at, scan
+from multidrop.families.lexium.manual.program_file import LONGEST_PROGRAM_LINE, ProgramLine, bare, remark_at, scan
 from multidrop.families.lexium.manual.program_flow import AT_POWER_UP
 from multidrop.families.lexium.manual.table import lookup
 
@@ -31,13 +31,13 @@ LABELS_AT: Mapping[str, tuple[bool, ...]] = {
 
 def expected(before: str) -> str:
     """Return what may follow `before`: a begun line without its last word."""
-    found = tokens(before)
-    if not found or found[-1].kind == "remark":
+    before_tokens = tokens(before)
+    if not before_tokens or before_tokens[-1].kind == "remark":
         return STATEMENT
-    head, commas = found[0].text.upper(), sum(each.kind == "comma" for each in found)
+    head, commas = before_tokens[0].text.upper(), sum(token.kind == "comma" for token in before_tokens)
     if head in ("LB", "VA"):
-        return VALUE if head == "VA" and len(found) > 2 else NEW
-    if commas == EVERY_PLACE.get(head) and found[-1].text in (found[0].text, "=", ","):
+        return VALUE if head == "VA" and len(before_tokens) > 2 else NEW
+    if commas == EVERY_PLACE.get(head) and before_tokens[-1].text in (before_tokens[0].text, "=", ","):
         return LABEL
     return PRINTED if head == "PR" else VALUE
 
@@ -97,16 +97,20 @@ class MCodeEditing(EditingLanguage):
         words = _declared_names(lines)
         others = words - {name.word} | {word}
         for number, (line, other) in enumerate(zip(lines, map(_read, renamed), strict=True), 1):
-            if len(other.text) > LONGEST >= len(line.text):
-                what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
+            if len(other.text) > LONGEST_PROGRAM_LINE >= len(line.text):
+                what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST_PROGRAM_LINE}"
                 raise Diagnostic(what, "", "choose a shorter name, or split the line")
             if _tokens(line, words, {name.word: word}) != _tokens(other, others, {}):
                 return f"line {number}"
         return ""
 
     def words(self, line: str, names: Container[str]) -> list[Word]:
-        found = statement_tokens(line[: remark_at(line)], names)
-        return [Word(each.start, each.stop, each.text.upper()) for each in found if each.kind in ("word", "op")]
+        tokens_of_line = statement_tokens(line[: remark_at(line)], names)
+        return [
+            Word(token.start, token.stop, token.text.upper())
+            for token in tokens_of_line
+            if token.kind in ("word", "op")
+        ]
 
     def describe(self, word: str, product: str) -> list[str]:
         try:
@@ -123,7 +127,7 @@ class MCodeEditing(EditingLanguage):
         place = expected(begun)
         if begun.count('"') % 2 or place == NEW:
             return
-        yield from (each.offer for each in names if (each.kind == "label") in LABELS_AT[place])
+        yield from (name.offer for name in names if (name.kind == "label") in LABELS_AT[place])
         for row in rows_offered(product) if place != LABEL else ():
             if _fits(row, place):
                 yield Offer(row.name, row.meaning, "starts" if row.name in TURNING else "word")
@@ -131,26 +135,26 @@ class MCodeEditing(EditingLanguage):
     def outline(self, text: str) -> list[Block]:
         """Return programs with their labels and variables, and the variables declared outside of programs."""
         sources = split_lines(text)
-        found: list[Block] = []
+        blocks: list[Block] = []
         opened: list[ProgramLine] = []
         for line in scan(text)[0]:
             if line.section != "program":
-                found += _declared([line], sources, line.number - 1)
+                blocks += _declared([line], sources, line.number - 1)
                 continue
             if line.mark and opened:  # the PG before is never ended
-                found.append(_program(opened, sources))
+                blocks.append(_program(opened, sources))
                 opened = []
             opened.append(line)
             if line.mark == "" and len(opened) > 1:
-                found.append(_program(opened, sources))
+                blocks.append(_program(opened, sources))
                 opened = []
-        return [*found, _program(opened, sources)] if opened else found
+        return [*blocks, _program(opened, sources)] if opened else blocks
 
 
 EDITING = MCodeEditing()
 
 
-class _Line(NamedTuple):
+class _FileLine(NamedTuple):
     """A line of a file: its text without remark, the column of that from 0, the name that it declares, its tokens."""
 
     text: str
@@ -160,22 +164,22 @@ class _Line(NamedTuple):
 
 
 @lru_cache(maxsize=16384)
-def _read(source: str) -> _Line:
+def _read(source: str) -> _FileLine:
     """Read a line; it is kept, as an editor asks for all lines again after every key."""
     text = bare(source)
     column = len(source) - len(source.lstrip(" \t"))
-    return _Line(text, column, ProgramLine(0, text, "").declares, tokens(text))
+    return _FileLine(text, column, ProgramLine(0, text, "").declares, tokens(text))
 
 
-def _declared_names(lines: Iterable[_Line]) -> frozenset[str]:
+def _declared_names(lines: Iterable[_FileLine]) -> frozenset[str]:
     return frozenset(line.declares for line in lines if line.declares)
 
 
-def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
+def _uses(line: _FileLine, words: Container[str]) -> Iterator[tuple[int, Token]]:
     """Yield the tokens of a line that are one of the words, each with its number; the letter after DN is none."""
-    found = divided(line.tokens, words)
-    names_device = bool(found) and found[0].text.upper() == "DN"
-    for number, token in enumerate(found):
+    parts = divided(line.tokens, words)
+    names_device = bool(parts) and parts[0].text.upper() == "DN"
+    for number, token in enumerate(parts):
         if token.kind == "word" and token.text.upper() in words and not (names_device and number):
             yield number, token
 
@@ -187,13 +191,13 @@ def _taken(word: str, product: str) -> str:
     return f"{word} is a word of {', '.join(sorted(each for each in EVERY if lookup(word, each)))}"
 
 
-def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
+def _tokens(line: _FileLine, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
     """Return the tokens of a line, its names in capitals and renamed."""
-    found = [token.text for token in divided(line.tokens, words)]
+    texts = [token.text for token in divided(line.tokens, words)]
     for number, token in _uses(line, words):
         upper = token.text.upper()
-        found[number] = new.get(upper, upper)
-    return found
+        texts[number] = new.get(upper, upper)
+    return texts
 
 
 def _fits(row: Mnemonic, place: str) -> bool:
@@ -224,8 +228,8 @@ def _declared(lines: Sequence[ProgramLine], sources: Sequence[str], end: int) ->
     for line in lines:
         if not line.declares:
             continue
-        found = statement_tokens(line.text, (line.declares,))
-        name = next((each for each in found[1:] if each.text.upper() == line.declares), None)
+        declared_tokens = statement_tokens(line.text, (line.declares,))
+        name = next((token for token in declared_tokens[1:] if token.text.upper() == line.declares), None)
         if name is None:
             continue
         start = line.column - 1 + name.start

@@ -32,7 +32,7 @@ OPERATORS = SUMS | LOGIC
 
 READ_LINES = 4096
 """The number of lines that are kept as they were read: session, codec and conversation ask for the same one."""
-LARGEST = 2**31
+LARGEST_NUMBER = 2**31
 """Beyond it no drive takes a whole number."""
 MOST_TOKENS = 256
 """Far more than fit into a drive's 64 characters; limits the parser's recursion."""
@@ -90,7 +90,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Name:
+class NameTerm:
     """A mnemonic, a label or a user variable, in capitals."""
 
     word: str
@@ -106,7 +106,7 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Unary:
+class UnaryTerm:
     """`-`, `!` or a function word, with its operand."""
 
     op: str
@@ -114,7 +114,7 @@ class Unary:
 
 
 @dataclass(frozen=True)
-class Binary:
+class BinaryTerm:
     """An arithmetic or bitwise operation."""
 
     op: str
@@ -131,7 +131,7 @@ class Compare:
     right: Expression
 
 
-Expression = Number | Name | Unary | Binary | Compare
+Expression = Number | NameTerm | UnaryTerm | BinaryTerm | Compare
 Argument = Expression | Text
 
 
@@ -161,12 +161,12 @@ def tokens(line: str) -> list[Token]:
 
 @lru_cache(maxsize=READ_LINES)
 def _tokens(line: str) -> tuple[Token, ...]:
-    found = []
+    tokens_so_far = []
     for match in _TOKEN.finditer(line):
         kind = match.lastgroup or "bad"
         if kind != "space":
-            found.append(Token(kind, match.group(), match.start()))
-    return tuple(found)
+            tokens_so_far.append(Token(kind, match.group(), match.start()))
+    return tuple(tokens_so_far)
 
 
 def words(line: str) -> set[str]:
@@ -192,10 +192,10 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
 
     Raises LineError.
     """
-    found = _read(line, names) if names else _read_alone(line)
-    if isinstance(found, LineError):
-        raise LineError(found.code, found.column, found.why)  # one that is kept would gather tracebacks
-    return found
+    statement = _read(line, names) if names else _read_alone(line)
+    if isinstance(statement, LineError):
+        raise LineError(statement.code, statement.column, statement.why)  # one that is kept would gather tracebacks
+    return statement
 
 
 @lru_cache(maxsize=READ_LINES)
@@ -204,21 +204,21 @@ def _read_alone(line: str) -> Statement | LineError | None:
 
 
 def _read(line: str, names: Container[str] = ()) -> Statement | LineError | None:
-    found = statement_tokens(line, names)
-    if not found:
+    parts = statement_tokens(line, names)
+    if not parts:
         return None
-    if len(found) > MOST_TOKENS:
-        return LineError(ErrorNumber.ILLEGAL_DATA, found[MOST_TOKENS].start, "the line is too long")
+    if len(parts) > MOST_TOKENS:
+        return LineError(ErrorNumber.ILLEGAL_DATA, parts[MOST_TOKENS].start, "the line is too long")
     try:
-        return _Parser(found, len(line), names).statement()
+        return _LineParser(parts, len(line), names).statement()
     except LineError as error:
         return error
 
 
 def parsed(line: str, names: Container[str] = ()) -> Statement | None:
     """Parse a line; None also for one that no drive accepts."""
-    found = _read(line, names) if names else _read_alone(line)
-    return None if isinstance(found, LineError) else found
+    statement = _read(line, names) if names else _read_alone(line)
+    return None if isinstance(statement, LineError) else statement
 
 
 def check_groups(line: str, names: Container[str] = ()) -> None:
@@ -228,10 +228,10 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
     that takes only 0 or 1. `PR` has as many fields as a line holds. A mark of a remark may divide groups: `MA 200'000`.
     So may a point: it is refused in a number alone where a word takes whole numbers. A drive reads `MA 200.000` as 200.
     """
-    found = divided(tokens(line), names)
-    word = found[0].text.upper() if found and found[0].kind == "word" else ""
+    parts = divided(tokens(line), names)
+    word = parts[0].text.upper() if parts and parts[0].kind == "word" else ""
     number, field, place = None, 0, 0
-    for token in found if word != "PR" else ():
+    for token in parts if word != "PR" else ():
         marked = token.kind in ("remark", "bad") and number is not None and number.stop == token.start
         if marked and (divides := grouped_at(line, token.start)) is not None:
             raise LineError(ErrorNumber.ILLEGAL_DATA, divides.start, divides.why)
@@ -247,7 +247,7 @@ def check_groups(line: str, names: Container[str] = ()) -> None:
             field += 1
         elif not token.text.isspace():  # a space that is not ASCII is no token of the language
             number = None
-    _check_points(found)
+    _check_points(parts)
 
 
 def _check_points(found: Sequence[Token]) -> None:
@@ -265,7 +265,7 @@ def _check_points(found: Sequence[Token]) -> None:
             whole, _, fraction = token.text.partition(".")
             group = f", or {whole}{fraction}" if len(fraction) == 3 and fraction.isdecimal() else ""
             near = float(token.text)
-            write = f"{near:.0f}{group}" if abs(near) < LARGEST else "a whole number"
+            write = f"{near:.0f}{group}" if abs(near) < LARGEST_NUMBER else "a whole number"
             why = f"{token.text} is not whole, and {row.name} takes whole numbers; write {write}"
             raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, why)
 
@@ -301,7 +301,7 @@ def divided(found: list[Token], names: Container[str]) -> list[Token]:
     return found
 
 
-class _Parser:
+class _LineParser:
     """Recursive descent over the tokens of a line."""
 
     def __init__(self, found: list[Token], width: int, names: Container[str]) -> None:
@@ -397,14 +397,14 @@ class _Parser:
             if op in COMPARISONS:
                 value = Compare(op, value, self.expression(self.side))
             else:
-                value = Binary(op, value, self.operand())
+                value = BinaryTerm(op, value, self.operand())
         return value
 
     def expression(self, operators: Container[str]) -> Expression:
         value = self.operand()
         while (token := self.found[self.at]) is not None and token.text in operators:
             self.at += 1
-            value = Binary(token.text, value, self.operand())
+            value = BinaryTerm(token.text, value, self.operand())
         return value
 
     def operand(self) -> Expression:
@@ -421,15 +421,15 @@ class _Parser:
         if token.kind == "word":
             word = token.text.upper()
             if word in FUNCTIONS and word not in self.names and self.at_operand():
-                return Unary(word, self.operand())
-            return Name(word, token.start)
+                return UnaryTerm(word, self.operand())
+            return NameTerm(word, token.start)
         if token.text in ("-", "+", "!"):
             operand = self.operand()
             if token.text == "+":
                 return operand
             if token.text == "-" and isinstance(operand, Number):
                 return Number(-operand.value)
-            return Unary(token.text, operand)
+            return UnaryTerm(token.text, operand)
         raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, _misplaced(token))
 
     def at_operand(self) -> bool:

@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from multidrop.families.lexium.manual.mnemonic import (
+    AllowedUse,
     Alone,
     AtZero,
-    Form,
-    Kept,
+    FormKind,
     Leads,
-    Memory,
+    MemoryEffect,
     Mnemonic,
-    Motion,
-    Named,
-    Position,
-    Prints,
-    Use,
-    Waiting,
-    Wire,
+    MotionEffect,
+    MotionWait,
+    NameEffect,
+    PositionEffect,
+    PrintedValue,
+    Retention,
+    WireSetting,
 )
 from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS
 
@@ -43,11 +43,11 @@ JOINED = those(lambda row: row.joined)
 """Instructions whose first argument may be a name, so that the name may follow without a space."""
 CONDITIONAL = those(lambda row: row.leads in (Leads.BRANCH, Leads.CALL))
 """The words whose second argument is a condition."""
-DECLARING = those(lambda row: row.variable is Named.DECLARE)
-LABELLING = those(lambda row: row.variable is Named.DECLARE and row.use is Use.STORED)
-STEPPING = those(lambda row: row.variable is Named.STEP)
+DECLARING = those(lambda row: row.variable is NameEffect.DECLARE)
+LABELLING = those(lambda row: row.variable is NameEffect.DECLARE and row.use is AllowedUse.STORED)
+STEPPING = those(lambda row: row.variable is NameEffect.STEP)
 """Instructions that add or subtract 1."""
-CHANGING = those(lambda row: row.variable in (Named.STEP, Named.INPUT))
+CHANGING = those(lambda row: row.variable in (NameEffect.STEP, NameEffect.INPUT))
 """Instructions that write the variable after them."""
 PLACES: Mapping[str, int] = {
     row.name: row.place for row in ROWS if row.leads in (Leads.BRANCH, Leads.CALL, Leads.ROUTINE)
@@ -62,9 +62,9 @@ LAST_LINES = those(lambda row: row.leads in (Leads.BRANCH, Leads.RETURN, Leads.E
 
 PRINTS_LINES = those(lambda row: row.lines)
 """The words whose PR prints several lines without an end of their own."""
-OPTIONED = those(lambda row: row.prints is Prints.OPTION)
+OPTIONED = those(lambda row: row.prints is PrintedValue.OPTION)
 """Words that take a number as an option."""
-SEVERAL = those(lambda row: row.prints in (Prints.OPTION, Prints.SEVERAL, Prints.LINES))
+SEVERAL = those(lambda row: row.prints in (PrintedValue.OPTION, PrintedValue.SEVERAL, PrintedValue.LINES))
 """Words that print several values."""
 SIGNS_OF_FAILURE = those(lambda row: row.sign)
 """Words whose value is the sign of a failure: a line that sets one clears it, and printing one may (5.1.40)."""
@@ -73,13 +73,13 @@ READ_BACK: Mapping[str, int] = {row.name: row.read_back for row in ROWS if row.r
 
 # Settings
 
-STATES = those(lambda row: row.kept is Kept.STATE)
+STATES = those(lambda row: row.kept is Retention.STATE)
 """Counters, readings, armed trips and flags, which S does not keep."""
-UNIT = those(lambda row: row.kept is Kept.UNIT)
+UNIT = those(lambda row: row.kept is Retention.UNIT)
 """Settings of the motor unit itself, which FD keeps (5.1.45)."""
-WIRE = those(lambda row: row.wire is not Wire.NO)
+WIRE = those(lambda row: row.wire is not WireSetting.NO)
 """Communication settings."""
-FORM_OF_LINES = those(lambda row: row.wire is Wire.FORM)
+FORM_OF_LINES = those(lambda row: row.wire is WireSetting.FORM)
 """Communication settings that the host must know to talk with a drive at all."""
 BANKED = those(lambda row: row.default_encoder is not None)
 """Settings with one value for steps and another for encoder counts (7.3.7)."""
@@ -88,12 +88,12 @@ COUNTED = BANKED | {"MS"}
 LISTS: Mapping[str, tuple[int, ...]] = {
     row.name: row.setup.numbers
     for row in sorted(ROWS, key=lambda row: -len(row.setup.numbers))
-    if row.setup.form is Form.LIST
+    if row.setup.form is FormKind.LIST
 }
 """The words whose PR prints a line for each number, and those numbers; the longest list first."""
-FIELDS: Mapping[str, int] = {row.name: row.setup.numbers[0] for row in ROWS if row.setup.form is Form.FIELDS}
+FIELDS: Mapping[str, int] = {row.name: row.setup.numbers[0] for row in ROWS if row.setup.form is FormKind.FIELDS}
 """Set-ups of several numbers, and how many."""
-SETUPS = those(lambda row: row.setup.form not in (Form.NONE, Form.NUMBER) and row.kept is not Kept.STATE)
+SETUPS = those(lambda row: row.setup.form not in (FormKind.NONE, FormKind.NUMBER) and row.kept is not Retention.STATE)
 """Settings that are not just a number in a range: a drive may refuse one when it executes it."""
 TRIPS: Mapping[str, int] = {row.name: row.trip for row in sorted(ROWS, key=lambda row: row.trip) if row.trip}
 """The trips, each with the number by which TE enables it."""
@@ -109,30 +109,35 @@ First those that can turn the motor, and those that DE or hMT restrict. Then com
 
 # Memory
 
-SLOW = those(lambda row: row.memory is not Memory.NOTHING)
+SLOW = those(lambda row: row.memory is not MemoryEffect.NOTHING)
 """Words that write to flash memory; the drive replies late (5.1.113)."""
-RESTORING = those(lambda row: row.memory in (Memory.RESTORES, Memory.RESETS))
+RESTORING = those(lambda row: row.memory in (MemoryEffect.RESTORES, MemoryEffect.RESETS))
 """Words that change all settings at once."""
 GUARDED: Mapping[str, Mnemonic] = {row.name: row for row in ROWS if row.guard}
 """Words whose lines a person must agree to."""
 
 # Positions
 
-SCALES = tuple(row.name for row in sorted(ROWS, key=lambda row: row.turn) if row.position is Position.SCALES)
+SCALES = tuple(row.name for row in sorted(ROWS, key=lambda row: row.turn) if row.position is PositionEffect.SCALES)
 """Settings that give a count its length and its sign, in the order in which they are asked for."""
-RECOUNTING = those(lambda row: row.position is not Position.NOTHING)
+RECOUNTING = those(lambda row: row.position is not PositionEffect.NOTHING)
 """Words that change what positions count: a counter, the length of a count, or its sign."""
 
 # Motion
 
-MOVES = those(lambda row: row.motion is Motion.MOVE)
+MOVES = those(lambda row: row.motion is MotionEffect.MOVE)
 """Instructions that move to a target."""
-HOMINGS = those(lambda row: row.motion is Motion.HOMING)
-MOTIONS = those(lambda row: row.motion in (Motion.MOVE, Motion.SLEW, Motion.HOMING))
+HOMINGS = those(lambda row: row.motion is MotionEffect.HOMING)
+MOTIONS = those(lambda row: row.motion in (MotionEffect.MOVE, MotionEffect.SLEW, MotionEffect.HOMING))
 """Instructions that start one motion. After it nothing moves by itself."""
-TURNING = those(lambda row: row.motion in (Motion.MOVE, Motion.SLEW, Motion.HOMING, Motion.TEST, Motion.RELEASE))
+TURNING = those(
+    lambda row: (
+        row.motion
+        in (MotionEffect.MOVE, MotionEffect.SLEW, MotionEffect.HOMING, MotionEffect.TEST, MotionEffect.RELEASE)
+    )
+)
 """Instructions with which the motor may turn, other than by a program."""
-PROGRAMS = those(lambda row: row.motion is Motion.PROGRAM)
+PROGRAMS = those(lambda row: row.motion is MotionEffect.PROGRAM)
 """Instructions that run a program, or go on in one."""
 WITHOUT_TARGET: Mapping[str, int] = {row.name: row.turns_at for row in ROWS if row.turns_at is not None}
 """Words that start, or let inputs start, motion without a target, and the value with which they do."""
@@ -146,7 +151,7 @@ CALM_AT_0 = those(lambda row: row.at_zero in (AtZero.MOTION, AtZero.TRIPS))
 """Words whose 0 starts nothing: no load falls, either."""
 NEEDING_REST = those(lambda row: row.rest)
 """Words that a moving drive refuses, or that change what the motion counts."""
-WATCHING = those(lambda row: row.waiting is Waiting.WATCHES)
+WATCHING = those(lambda row: row.waiting is MotionWait.WATCHES)
 """Words by which a program watches the motion."""
-HOLDING = those(lambda row: row.waiting is Waiting.HOLDS)
+HOLDING = those(lambda row: row.waiting is MotionWait.HOLDS)
 """Instructions that wait, or end the motion or the program."""

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, Protection, to_all
-from multidrop.families.lexium.manual.grammar import LineError, Name, Number, Text, parse, parsed
+from multidrop.families.lexium.manual.grammar import LineError, NameTerm, Number, Text, parse, parsed
 from multidrop.families.lexium.manual.groups import ENDING_AT_0, GUARDED, STOPPING_AT_0
 from multidrop.families.lexium.manual.mnemonic import ETHERNET
 from multidrop.families.lexium.manual.program_file import bare
@@ -62,8 +62,12 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
 def prints_reset(line: str) -> bool:
     """Whether a PR has Ctrl+C in a text (5.1.102): other drives of a party line may take it for theirs (5.1.19)."""
     statement = parsed(line)
-    texts = [each.value for each in statement.arguments if isinstance(each, Text)] if statement is not None else [line]
-    return any(_RESET.search(each) for each in texts)
+    texts = (
+        [argument.value for argument in statement.arguments if isinstance(argument, Text)]
+        if statement is not None
+        else [line]
+    )
+    return any(_RESET.search(text) for text in texts)
 
 
 def _erased(line: str, product: str) -> str:
@@ -74,31 +78,33 @@ def _erased(line: str, product: str) -> str:
     statement = parsed(line)
     arguments = statement.arguments if statement is not None else ()
     option, places = None, arguments
-    if words(product) is MNEMONICS and (len(arguments) == 2 or arguments in ((Number(0),), (Number(1),), (Name("S"),))):
+    if words(product) is MNEMONICS and (
+        len(arguments) == 2 or arguments in ((Number(0),), (Number(1),), (NameTerm("S"),))
+    ):
         option, places = arguments[0], arguments[1:]
     what = "the program"
     match places:
-        case (Name(word),):
+        case (NameTerm(word),):
             what = f"everything from {word} to the end of program memory"
         case (Number(value),):
             what = f"everything from address {value} to the end of program memory"
         case (_, *_):
             return ""
-    more = {Number(1): " and every user variable", Name("S"): ", and saves that"}
-    return f"erases {what}{more.get(option, '') if isinstance(option, (Name, Number)) else ''}" if arguments else ""
+    more = {Number(1): " and every user variable", NameTerm("S"): ", and saves that"}
+    return f"erases {what}{more.get(option, '') if isinstance(option, (NameTerm, Number)) else ''}" if arguments else ""
 
 
 def addressed(text: str, product: str) -> tuple[str, str] | None:
     """Split a line into a drive's name and a command, where it is one only so (`bMR 5`, as manuals have it)."""
     line = bare(text)
-    if (found := _NAMED.match(line)) is None or _read(line, product) is not None:
+    if (match := _NAMED.match(line)) is None or _read(line, product) is not None:
         return None
-    if found.end() > 1 and parsed(line) is not None:
+    if match.end() > 1 and parsed(line) is not None:
         return None  # `b R1` may set a variable of a program
-    rest = line[found.end() :]
+    rest = line[match.end() :]
     statement = parsed(rest)
     known = statement is not None and lookup(statement.word, product) is not None
-    return (found[1], rest) if known else None
+    return (match[1], rest) if known else None
 
 
 def acts(text: str) -> bool:
@@ -134,8 +140,8 @@ def _head(line: str, product: str) -> tuple[str, str, int | str]:
 
     The value is a whole number, other text, or nothing. A head that has a meaning by itself begins with no name.
     """
-    if (found := _read(line, product)) is not None:
-        return "", *found
+    if (statement := _read(line, product)) is not None:
+        return "", *statement
     if (named := _NAMED.match(line)) is not None:
         return named[1], *(_read(line[named.end() :], product) or ("", ""))
     return "", "", ""
@@ -145,9 +151,9 @@ def _read(line: str, product: str) -> tuple[str, int | str] | None:
     try:
         statement = parse(line)
     except LineError:
-        found = _WORD.match(line)
-        known = found is not None and lookup(found[1], product) is not None
-        return (found[1].upper(), found[2].strip()) if found is not None and known else None
+        match = _WORD.match(line)
+        known = match is not None and lookup(match[1], product) is not None
+        return (match[1].upper(), match[2].strip()) if match is not None and known else None
     if statement is None or lookup(statement.word, product) is None:
         return None
     match statement.arguments:

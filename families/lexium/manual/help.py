@@ -24,10 +24,10 @@ _SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
 
 
 def _lines_of(name: str, key: str) -> Mapping[str, list[Mapping[str, str]]]:
-    found: dict[str, list[Mapping[str, str]]] = {}
+    by_name: dict[str, list[Mapping[str, str]]] = {}
     for row in rows(__file__, name):
-        found.setdefault(row[key], []).append(row)
-    return found
+        by_name.setdefault(row[key], []).append(row)
+    return by_name
 
 
 @cache
@@ -45,14 +45,14 @@ def topics() -> Mapping[str, list[Mapping[str, str]]]:
 def _topic(word: str) -> str:
     """The topic that a word names, in the plural too; empty: it names none."""
     name = word.strip().lower()
-    return next((each for each in (name, name.removesuffix("s")) if each in topics()), "")
+    return next((topic for topic in (name, name.removesuffix("s")) if topic in topics()), "")
 
 
 class MCodeLanguage(Language):
     """Help on the words of MCode. Without a product it describes a Lexium, and also finds words of other products."""
 
     def names(self) -> list[str]:
-        return sorted({*MNEMONICS, *MDRIVE, *(each.upper() for each in topics())})
+        return sorted({*MNEMONICS, *MDRIVE, *(topic.upper() for topic in topics())})
 
     def knows(self, word: str) -> bool:
         return lookup(word) is not None or bool(_topic(word))
@@ -71,12 +71,12 @@ class MCodeLanguage(Language):
 
         Raises Diagnostic for a number without a meaning.
         """
-        found: dict[tuple[str, str], list[str]] = {}
+        by_meaning: dict[tuple[str, str], list[str]] = {}
         for family in [product] if product else errors.TEXTS:
-            found.setdefault((errors.text(code, family), errors.hint(code, family)), []).append(family)
+            by_meaning.setdefault((errors.text(code, family), errors.hint(code, family)), []).append(family)
         lines = []
-        for (text, advice), families in found.items():
-            where = f" ({', '.join(families)})" if len(found) > 1 else ""
+        for (text, advice), families in by_meaning.items():
+            where = f" ({', '.join(families)})" if len(by_meaning) > 1 else ""
             lines += remedied(f"error {code}{where}: {text}", advice) if text != errors.UNKNOWN else []
         if not lines:
             what = f"no error {code} on {product}" if product else f"no error {code}"
@@ -89,8 +89,8 @@ class MCodeLanguage(Language):
 
     def typing(self, text: str) -> str:
         """Return the word at the end of a line that may be completed; none within quotation marks."""
-        found = _LAST.search(text)
-        return found.group() if found and text.count('"') % 2 == 0 else ""
+        match = _LAST.search(text)
+        return match.group() if match and text.count('"') % 2 == 0 else ""
 
     def hint(self, text: str, product: str = "") -> str:
         """Return syntax and meaning of the word being typed; empty where it is unknown."""
@@ -104,7 +104,7 @@ class MCodeLanguage(Language):
             return f"read as {condition_reading(condition)}"
         row = _row_of(first.group(), product)
         if row is not None and row.name == "PR":
-            printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
+            printed = [mnemonic for word in _WORD.findall(plain[first.end() :]) if (mnemonic := _row_of(word, product))]
             row = printed[-1] if printed else row
             return f"{'PR ' + row.name if printed else row.syntax}   {_told(row)}"
         return f"{row.syntax}   {_told(row)}" if row and row.syntax else ""
@@ -203,12 +203,12 @@ def _span(row: Mnemonic, encoder: bool) -> str:
 
 def _products(name: str) -> str:
     """The products that have a word, from all tables."""
-    found = frozenset().union(*(table[name].products for table in (MNEMONICS, MDRIVE) if name in table))
-    if found == EVERY:
+    products = frozenset().union(*(table[name].products for table in (MNEMONICS, MDRIVE) if name in table))
+    if products == EVERY:
         return "all"
     parts = []
     for everyone, family in ((LEXIUM, "Lexium MDrive and Motion Module"), (MDRIVE_PLUS, "MDrivePlus")):
-        parts += [family] if everyone <= found else sorted(found & everyone)
+        parts += [family] if everyone <= products else sorted(products & everyone)
     return ", ".join(parts)
 
 
@@ -255,7 +255,7 @@ def form_of(text: str, product: str) -> str:
 def out_of_range(statement: Statement, product: str) -> str:
     """The numbers that a statement's word takes, if its one argument is a number and none of them; else empty."""
     row = lookup(statement.word, product)
-    numbers = [each.value for each in statement.arguments if isinstance(each, Number)]
+    numbers = [argument.value for argument in statement.arguments if isinstance(argument, Number)]
     if row is None or len(numbers) != 1 or len(statement.arguments) != 1:
         return ""
     if row.accepts(numbers[0]) or row.accepts(numbers[0], encoder=True):

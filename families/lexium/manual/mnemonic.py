@@ -38,7 +38,7 @@ Number = int | float
 Default = int | float | str | None
 
 
-class Use(StrEnum):
+class AllowedUse(StrEnum):
     """Where a word is allowed."""
 
     BOTH = "both"
@@ -48,7 +48,7 @@ class Use(StrEnum):
     NEVER = "never"
 
 
-class Prints(StrEnum):
+class PrintedValue(StrEnum):
     """What PR prints for a word."""
 
     NOTHING = "-"
@@ -62,7 +62,7 @@ class Prints(StrEnum):
     """Several lines, without an end of their own."""
 
 
-class Form(StrEnum):
+class FormKind(StrEnum):
     """What a value consists of."""
 
     NONE = "-"
@@ -82,7 +82,7 @@ class Form(StrEnum):
 class Setup(NamedTuple):
     """The form of a value, with what its kind needs."""
 
-    form: Form
+    form: FormKind
     numbers: tuple[int, ...] = ()
     removable: bool = False
     """A trip that 0 removes; others stay until FD."""
@@ -111,7 +111,7 @@ class Leads(StrEnum):
     """Nowhere: the program ends."""
 
 
-class Named(StrEnum):
+class NameEffect(StrEnum):
     """What a word does to the name after it."""
 
     NOTHING = "-"
@@ -123,7 +123,7 @@ class Named(StrEnum):
     """Declares it as a variable or a label."""
 
 
-class Kept(StrEnum):
+class Retention(StrEnum):
     """How long a value is kept (5.1.45, 5.1.113)."""
 
     NONE = "-"
@@ -136,7 +136,7 @@ class Kept(StrEnum):
     """After S, and FD keeps it: it belongs to the motor unit."""
 
 
-class Wire(StrEnum):
+class WireSetting(StrEnum):
     """Whether a setting belongs to communication."""
 
     NO = "-"
@@ -146,7 +146,7 @@ class Wire(StrEnum):
     """It is another setting of the line."""
 
 
-class Position(StrEnum):
+class PositionEffect(StrEnum):
     """What writing a word does to positions."""
 
     NOTHING = "-"
@@ -158,7 +158,7 @@ class Position(StrEnum):
     """Changes the length or the sign of what a position counts."""
 
 
-class Quantity(StrEnum):
+class WordQuantity(StrEnum):
     """What the number of a typed line, or the one that PR prints, measures in the unit of motion."""
 
     NONE = "-"
@@ -170,7 +170,7 @@ class Quantity(StrEnum):
     ACCELERATION = "acceleration"
 
 
-class Motion(StrEnum):
+class MotionEffect(StrEnum):
     """What an instruction does to motion."""
 
     NONE = "-"
@@ -215,7 +215,7 @@ class Alone(StrEnum):
     """The drive goes back to its own position."""
 
 
-class Waiting(StrEnum):
+class MotionWait(StrEnum):
     """How a line of a program with this word may wait for the end of a motion."""
 
     NO = "-"
@@ -225,7 +225,7 @@ class Waiting(StrEnum):
     """Its value shows the motion."""
 
 
-class Memory(StrEnum):
+class MemoryEffect(StrEnum):
     """What an instruction does to the memory that keeps settings and programs; a drive is slow to reply to each."""
 
     NOTHING = "-"
@@ -276,42 +276,42 @@ class Mnemonic:
     """The first firmware of a Lexium that has it; 0: any has."""
     large: bool
     """A Lexium of NEMA size 17 lacks it."""
-    use: Use
+    use: AllowedUse
     joined: bool
     """A name may follow it without a space."""
     leads: Leads
     place: int
     """The position of the place among its arguments, from 0; -1: it takes none."""
-    variable: Named
-    prints: Prints
+    variable: NameEffect
+    prints: PrintedValue
     setup: Setup
-    kept: Kept
+    kept: Retention
     restored: int | None
     """Its turn when settings are restored: those with 0 in any order, then the others; None: it is no setting."""
-    wire: Wire
+    wire: WireSetting
     read_back: int | None
     """The greatest difference between a written number and what PR prints of it, until something else writes it.
 
     None: a reading does not confirm a number that was written.
     """
-    quantity: Quantity
-    position: Position
+    quantity: WordQuantity
+    position: PositionEffect
     turn: int
     """Its turn among the settings that give a count its length and its sign, when these are asked for; 0: it is none.
     """
     starts: bool
     """Whether it can start motion or a program when executed at once; for a value, when written."""
-    motion: Motion
+    motion: MotionEffect
     turns_at: int | None
     """The value with which it starts, or lets inputs start, motion without a target."""
     at_zero: AtZero
     alone: Alone
     rest: bool
     """It needs a drive at rest: a moving drive refuses it, or it changes what the motion counts."""
-    waiting: Waiting
+    waiting: MotionWait
     sign: bool
     """Its value is the sign of a failure, which a line that writes it clears. Reading it may clear it, too."""
-    memory: Memory
+    memory: MemoryEffect
     guard: str
     """What a line does to which a person must agree first, a setting where a value is written; empty: it needs none."""
     harmless: frozenset[int]
@@ -320,16 +320,16 @@ class Mnemonic:
 
     @property
     def immediate(self) -> bool:
-        return self.use in (Use.BOTH, Use.TYPED)
+        return self.use in (AllowedUse.BOTH, AllowedUse.TYPED)
 
     @property
     def program(self) -> bool:
-        return self.use in (Use.BOTH, Use.STORED)
+        return self.use in (AllowedUse.BOTH, AllowedUse.STORED)
 
     @property
     def lines(self) -> bool:
         """Its PR prints several lines, without an end of their own."""
-        return self.prints is Prints.LINES
+        return self.prints is PrintedValue.LINES
 
     @property
     def valued(self) -> bool:
@@ -339,7 +339,7 @@ class Mnemonic:
     @property
     def trip(self) -> int:
         """The bit of TE that enables this trip; 0: it is none."""
-        return self.setup.numbers[0] if self.setup.form is Form.TRIP else 0
+        return self.setup.numbers[0] if self.setup.form is FormKind.TRIP else 0
 
     @property
     def whole(self) -> bool:

@@ -20,14 +20,14 @@ from multidrop.dialects.values import (
 )
 from multidrop.families.lexium.manual import groups
 from multidrop.families.lexium.manual import parameters as manual
-from multidrop.families.lexium.manual.mnemonic import EXPANDED, MDRIVE_PLUS, Alone, Kept
+from multidrop.families.lexium.manual.mnemonic import EXPANDED, MDRIVE_PLUS, Alone, Retention
 from multidrop.families.lexium.manual.parameters import CLOCKS, SHARED, TORQUE, writable
 from multidrop.families.lexium.manual.point_types import OUTPUT_TYPES, types
 from multidrop.families.lexium.manual.table import lookup
 
 IN_UNITS = frozenset(
     each
-    for word in groups.those(lambda row: row.unit_encoder != "" and row.kept is Kept.SAVED)
+    for word in groups.those(lambda row: row.unit_encoder != "" and row.kept is Retention.SAVED)
     for each in ([f"{word}{n}" for n in groups.LISTS[word]] if word in groups.LISTS else [word])
 )
 """Settings in the unit of motion: steps or encoder counts."""
@@ -54,7 +54,7 @@ def impossible(name: str, value: Value, now: Mapping[str, Value | None], labels:
     if value == 0:
         return "a drive cannot forget a trip; FD does"
     targets = value[1:2] if isinstance(value, tuple) else (value,)
-    missing = [each for each in targets if isinstance(each, str) and each.upper() not in labels]
+    missing = [target for target in targets if isinstance(target, str) and target.upper() not in labels]
     return f"the program in the drive has no label {missing[0]}; download it first" if missing else ""
 
 
@@ -63,37 +63,37 @@ def dependents(now: Mapping[str, Value], wanted: Mapping[str, Value], withheld: 
     goal = {name: value for name, value in wanted.items() if name not in withheld}
     final = {**now, **goal}
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
-    found: dict[str, str] = {}
+    dependent: dict[str, str] = {}
     if changed.get("AS") and 0 in (now.get("DE"), final.get("DE")):
-        found["AS"] = "hMT needs DE=1"
+        dependent["AS"] = "hMT needs DE=1"
     if "AS" in withheld and final.get("AS") and number(final.get("MS")) < LEAST_WITH_HMT:
-        found["MS"] = f"hMT (AS) needs {LEAST_WITH_HMT} or more"
+        dependent["MS"] = f"hMT (AS) needs {LEAST_WITH_HMT} or more"
     if "MS" in withheld:
-        found |= dict.fromkeys(IN_UNITS, "it is in microsteps, and MS is left alone")
+        dependent |= dict.fromkeys(IN_UNITS, "it is in microsteps, and MS is left alone")
     if manual.counting(final) or manual.counting(now):
-        found |= dict.fromkeys(("MF", "TS"), "it can be set in steps only (EE=0)")
+        dependent |= dict.fromkeys(("MF", "TS"), "it can be set in steps only (EE=0)")
     if changed.get("FL") and _kind(final.get("IS3")) not in CLOCKS:
-        found["FL"] = "inputs 3 and 4 are no clock"
-    found = {**found, **_without_points(now, changed, withheld)}
+        dependent["FL"] = "inputs 3 and 4 are no clock"
+    dependent = {**dependent, **_without_points(now, changed, withheld)}
     if manual.counting(final) != manual.counting({**now, **wanted}):
-        found |= dict.fromkeys(IN_UNITS | {"MS"}, "it is in the other unit of motion (EE, AS)")
+        dependent |= dict.fromkeys(IN_UNITS | {"MS"}, "it is in the other unit of motion (EE, AS)")
     if manual.counting(now) and not manual.counting(final) and "MS" not in goal:
-        found["VM"] = "the MS that comes into force is not known, and the file has none"
-    return {name: reason for name, reason in found.items() if name in goal}
+        dependent["VM"] = "the MS that comes into force is not known, and the file has none"
+    return {name: reason for name, reason in dependent.items() if name in goal}
 
 
 def _without_points(
     now: Mapping[str, Value], changed: Mapping[str, Value], withheld: Collection[str]
 ) -> dict[str, str]:
     """Points whose type another point still has, and the other point of a clock that is left alone."""
-    found: dict[str, str] = {}
+    withdrawn: dict[str, str] = {}
     for name, value in changed.items():
         kind, held = _kind(value), [_kind(now[each]) for each in withheld if each in now and group(each) == group(name)]
         if kind is not None and kind not in SHARED and kind in held:
-            found[name] = f"another point has type {kind} and is left alone"
+            withdrawn[name] = f"another point has type {kind} and is left alone"
         if PAIRS.get(name) in withheld and CLOCKS & {kind, _kind(now.get(name))}:
-            found[name] = f"a clock takes two points, and {PAIRS[name]} is left alone"
-    return found
+            withdrawn[name] = f"a clock takes two points, and {PAIRS[name]} is left alone"
+    return withdrawn
 
 
 def _kind(value: Value | None) -> object:
@@ -184,7 +184,7 @@ def group(name: str) -> str:
 # The steps of a plan so far, and the settings that a drive has after them.
 
 
-class Steps:
+class PlannedSteps:
     """Steps towards a goal. `now` has the drive's values after them; None for an unknown value."""
 
     def __init__(self, product: str, present: Mapping[str, Value], goal: dict[str, Value]) -> None:
@@ -269,7 +269,7 @@ def steps(
 ) -> list[Change]:
     """Order the steps, and add to `impossible`. Raises Diagnostic for values that the drive refuses."""
     goal = _goal(product, present, wanted, withheld, impossible)
-    made = Steps(product, present.values, goal)
+    made = PlannedSteps(product, present.values, goal)
     for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
         order(made)
     made.reach(*(name for name in goal if name not in groups.RESTORED_LAST))
@@ -305,7 +305,7 @@ def _goal(
 # The unit of motion
 
 
-def _leave_counts(steps: Steps) -> None:
+def _leave_counts(steps: PlannedSteps) -> None:
     """Leave encoder counts, then torque mode or hMT. hMT takes EE=1 away from the unit of motion: EE=0 for a while."""
     if steps.goal.get("EE") == 0:
         steps.reach("EE")
@@ -316,7 +316,7 @@ def _leave_counts(steps: Steps) -> None:
         steps.reach("AS")
 
 
-def _enter_counts(steps: Steps) -> None:
+def _enter_counts(steps: PlannedSteps) -> None:
     """Enter encoder counts, with a VI of at least one count. With hMT EE changes no unit, and follows AS."""
     if not steps.differs("EE") or steps.goal.get("AS", steps.now.get("AS")):
         return
@@ -335,7 +335,7 @@ def _enter_counts(steps: Steps) -> None:
 # Resolution and velocities
 
 
-def _speeds(steps: Steps) -> None:
+def _speeds(steps: PlannedSteps) -> None:
     """Reach MF, which VM bounds, and TS, which MS bounds, while VM and MS are high enough."""
     if steps.differs("TS"):
         _allow(steps, number(steps.goal["TS"]))
@@ -352,7 +352,7 @@ def _speeds(steps: Steps) -> None:
         steps.reach("MF")
 
 
-def _allow(steps: Steps, speed: float) -> None:
+def _allow(steps: PlannedSteps, speed: float) -> None:
     """Make MS fine enough for a velocity in steps."""
     resolution = steps.number("MS")
     if steps.product not in MDRIVE_PLUS and (resolution is None or resolution * PER_MICROSTEP < speed):
@@ -360,7 +360,7 @@ def _allow(steps: Steps, speed: float) -> None:
         steps.send("MS", FINEST, temporary=True)
 
 
-def _resolution(steps: Steps) -> None:
+def _resolution(steps: PlannedSteps) -> None:
     """Reach MS, SA and EL. While the motor counts, those that make microsteps finer for the encoder go first."""
     if manual.counting({**steps.now, **steps.goal}) and manual.locks_resolution(steps.product):
         return
@@ -373,7 +373,7 @@ def _resolution(steps: Steps) -> None:
     steps.reach(*finer, *names)
 
 
-def _velocities(steps: Steps) -> None:
+def _velocities(steps: PlannedSteps) -> None:
     steps.reach("A", "D")
     if steps.differs("VI") and steps.differs("VM"):
         slowest, fastest = steps.number("VI"), number(steps.goal["VM"])
@@ -387,7 +387,7 @@ def _velocities(steps: Steps) -> None:
 # Pairs and points
 
 
-def _pairs(steps: Steps) -> None:
+def _pairs(steps: PlannedSteps) -> None:
     """Reach LS, of which the minus limit is below the plus limit while both are enabled, then HT and MT.
 
     Of these the one that falls goes first: their sum has a bound.
@@ -399,13 +399,13 @@ def _pairs(steps: Steps) -> None:
     steps.reach(*falling, "HT", "MT")
 
 
-def _points(steps: Steps) -> None:
+def _points(steps: PlannedSteps) -> None:
     """Reach the set-ups of points. A type that another point still has is released first."""
     names = [name for name in steps.goal if types(name, steps.product) and steps.differs(name)]
     for name in names:
         held = steps.now.get(name)
         others = [steps.goal[each] for each in names if each != name and group(each) == group(name)]
-        kinds = [each[0] for each in others if isinstance(each, tuple)]
+        kinds = [kind[0] for kind in others if isinstance(kind, tuple)]
         if isinstance(held, tuple) and held[0] not in SHARED and held[0] in kinds:
             free = 16 if name.startswith("OS") else 0
             steps.send(name, (free, *held[1:]), temporary=True)

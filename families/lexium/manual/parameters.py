@@ -33,7 +33,7 @@ ANALOG_UNREAD = ("IS5", "PR IS does not print it")
 HANDLER_UNREAD = ("OE", "no drive prints it")
 
 
-class Form(Enum):
+class SettingForm(Enum):
     """How PR prints a setting, as a regular expression."""
 
     DIGIT = r"\d"
@@ -46,7 +46,7 @@ class Form(Enum):
 @lru_cache(maxsize=64)
 def settings(product: str, version: str = "", part: str = "") -> tuple[Mnemonic, ...]:
     """The settings that a drive prints beside others, in the order of their forms."""
-    lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(Form), product in EVERY
+    lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(SettingForm), product in EVERY
     rows = [row for row in words(product).values() if row.access == "RW" and row.valued]
     rows = [row for row in rows if (product in row.products if known else row.products >= LEXIUM)]
     rows = [row for row in rows if not row.lines and row.name not in lacks]
@@ -89,9 +89,9 @@ def fresh(name: str) -> Value | None:
         return 0
     if POINT.fullmatch(name):
         return (0, 0, 0)
-    found = _SETUP.fullmatch(name)
-    if found is not None:
-        return (16, 0) if found[1] == "OS" else (0, 0)
+    match = _SETUP.fullmatch(name)
+    if match is not None:
+        return (16, 0) if match[1] == "OS" else (0, 0)
     default = MNEMONICS[name].default if name in MNEMONICS else None
     return tuple(map(int, default.split(","))) if isinstance(default, str) and "," in default else None
 
@@ -123,15 +123,15 @@ def _lacking(version: str, part: str) -> frozenset[str]:
     return frozenset(name for name, row in MNEMONICS.items() if lacks(row, version, part))
 
 
-def form_of(row: Mnemonic) -> Form:
+def form_of(row: Mnemonic) -> SettingForm:
     if row.name in TRIPS:
-        return Form.TRIP
+        return SettingForm.TRIP
     if row.low is None:
-        return Form.FIELDS
+        return SettingForm.FIELDS
     if isinstance(row.default, float):
-        return Form.FRACTION
+        return SettingForm.FRACTION
     small = isinstance(row.high, int) and row.low >= 0 and row.high <= 9
-    return Form.DIGIT if small else Form.WHOLE
+    return SettingForm.DIGIT if small else SettingForm.WHOLE
 
 
 # The rules for writing one setting of an MCode drive: the line, its range, and what needs a person's word.
@@ -155,15 +155,15 @@ POINT = re.compile(r"S\d+")
 
 def row_of(name: str, product: str) -> Mnemonic | None:
     """The row of a setting's word; `IS1` is a setting of IS. None for a user's variable."""
-    found = _SETUP.fullmatch(name)
-    return lookup(found[1] if found else name, product if product in EVERY else "")
+    match = _SETUP.fullmatch(name)
+    return lookup(match[1] if match else name, product if product in EVERY else "")
 
 
 def line(name: str, value: Value, new: bool = False) -> str:
     """The line that gives a setting a value; `new`: a user's variable that the drive lacks."""
-    found = _SETUP.fullmatch(name)
-    if found is not None:
-        return f"{found[1]}={found[2]},{_fields(value)}"
+    match = _SETUP.fullmatch(name)
+    if match is not None:
+        return f"{match[1]}={match[2]},{_fields(value)}"
     if name == "DN":
         return f'DN="{value}"'
     return f"{'VA ' if new else ''}{name}={_fields(value)}"

@@ -67,8 +67,8 @@ LIMITS = ("lim+", "lim-")
 
 def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
     rows = [facts.get(name) for name in ("LS0", "LS1")]
-    found = [int(number(row[0])) for row in rows if isinstance(row, tuple) and len(row) == 2 and row[1]]
-    limits = (found[0], found[1]) if len(found) == 2 and found[0] < found[1] else None
+    numbers = [int(number(row[0])) for row in rows if isinstance(row, tuple) and len(row) == 2 and row[1]]
+    limits = (numbers[0], numbers[1]) if len(numbers) == 2 and numbers[0] < numbers[1] else None
     pace = [number(facts[name]) for name in ("VI", "VM", "A", "D") if name in facts]
     analog = (Lamp("ai", str(facts["I5"])),) if "I5" in facts else ()  # neither on nor off
     locked = facts.get("AS") and int(number(facts.get("AF", 0))) & LOCKED  # (MCode reference 5.1.20, 5.1.30)
@@ -99,7 +99,7 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
 def met(product: str, facts: Facts) -> tuple[str, ...]:
     """The limits whose inputs are active, `limit+`."""
     lamps = _inputs(product, facts)
-    return tuple(each.function.replace("lim", "limit") for each in lamps if each.on and each.function in LIMITS)
+    return tuple(lamp.function.replace("lim", "limit") for lamp in lamps if lamp.on and lamp.function in LIMITS)
 
 
 def _whole(facts: Facts, name: str) -> int | None:

@@ -11,7 +11,7 @@ from multidrop.families.lexium.manual import guards, program_file, program_flow
 from multidrop.families.lexium.manual.grammar import (
     NAME_FORM,
     LineError,
-    Name,
+    NameTerm,
     Number,
     Statement,
     is_name,
@@ -125,16 +125,16 @@ def check(text: str, product: str = "") -> list[Problem]:
     A word that `product` leaves free is a name; without a product every word of any table is known.
     """
     lines, problems = program_file.scan(text)
-    unsendable = {each.line for each in problems if not each.warning}
-    reader = _Reader(lines, product=product)
+    unsendable = {problem.line for problem in problems if not problem.warning}
+    reader = _StatementReader(lines, product=product)
     for line in lines:
         if line.number not in unsendable:
             problems += reader.read(line)
-    problems += _forgotten(lines, reader, {each.line for each in errors(problems)})
+    problems += _forgotten(lines, reader, {error.line for error in errors(problems)})
     return in_order(problems)
 
 
-def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[int]) -> Iterator[Problem]:
+def _forgotten(lines: Sequence[ProgramLine], reader: _StatementReader, wrong: Container[int]) -> Iterator[Problem]:
     """Warn of what the correct lines do together. A line with an error may have what others lack."""
     correct = {number: each for number, each in reader.statements.items() if number not in wrong}
     read = [(line, correct[line.number]) for line in lines if line.number in correct]
@@ -176,8 +176,8 @@ def _when_executed(read: Read, product: str) -> Iterator[Problem]:
 
 
 def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
-    reader = _Reader(lines, variables)
-    return [each for line in lines for each in reader.read(line) if not each.warning]
+    reader = _StatementReader(lines, variables)
+    return [problem for line in lines for problem in reader.read(line) if not problem.warning]
 
 
 def measure(text: str) -> str:
@@ -186,7 +186,7 @@ def measure(text: str) -> str:
     return f"{sum(line.mark is None for line in inside)} lines of program"
 
 
-class _Reader:
+class _StatementReader:
     """The statements of a file in turn, with all names that it declares."""
 
     def __init__(self, lines: Sequence[ProgramLine], more: Iterable[str] = (), product: str = "") -> None:
@@ -225,7 +225,7 @@ class _Reader:
 
     def label(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
         first = statement.arguments[0] if statement.arguments else None
-        if statement.word != "LB" or not isinstance(first, Name):
+        if statement.word != "LB" or not isinstance(first, NameTerm):
             return
         if first.word in self.labels:
             what = f"LB {first.word} is already in line {self.labels[first.word]}"

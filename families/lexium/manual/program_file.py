@@ -17,13 +17,21 @@ from math import inf
 
 from multidrop.base.comments import outside
 from multidrop.base.files import SourceLine, split_lines, wrong_characters
-from multidrop.dialects.program_files import Entry, Part, Problem, check_comment, check_enter, refuse, respelled
+from multidrop.dialects.program_files import (
+    LinePart,
+    Problem,
+    ProgramEntry,
+    check_comment,
+    check_enter,
+    refuse,
+    respelled,
+)
 from multidrop.families.lexium.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.families.lexium.manual.groups import DECLARING, TURNING
 from multidrop.families.lexium.manual.statements import canonical
 from multidrop.families.lexium.manual.table import lookup
 
-LONGEST = 64
+LONGEST_PROGRAM_LINE = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""
 
 MARKS = re.compile(r"['`\\]")
@@ -45,14 +53,14 @@ class ProgramLine(SourceLine):
     @property
     def mark(self) -> str | None:
         """The address of a PG, empty for the PG that ends a program; None for any other line."""
-        found = _PROGRAM.match(self.text)
-        return found[1] if found else None
+        match = _PROGRAM.match(self.text)
+        return match[1] if match else None
 
     @property
     def declares(self) -> str:
         """The name that its LB or VA declares, in capitals; empty for any other line."""
-        found = _DECLARES.match(self.text)
-        return found[2].upper() if found else ""
+        match = _DECLARES.match(self.text)
+        return match[2].upper() if match else ""
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
@@ -78,7 +86,7 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
     names = frozenset(line.declares for line in lines if line.declares)
     problems = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(raw)]
     problems += check_enter([line[: remark_at(line)] for line in raw], names)
-    wrong = {each.line for each in problems}
+    wrong = {problem.line for problem in problems}
     for line in lines:
         if line.number not in wrong:
             problems += _unsendable(line, raw[line.number - 1], names)
@@ -98,21 +106,21 @@ def bare(line: str) -> str:
 def spaced(line: str) -> str:
     """Return a line without indent and trailing blanks; tabs between words become blanks."""
     parts = line.split('"')
-    found = '"'.join(part if at % 2 else part.replace("\t", " ") for at, part in enumerate(parts)).strip(" ")
-    return line if found == line else found
+    spaced_line = '"'.join(part if at % 2 else part.replace("\t", " ") for at, part in enumerate(parts)).strip(" ")
+    return line if spaced_line == line else spaced_line
 
 
 def remark_at(line: str) -> int:
     """Find where the remark of a line begins: after its last character if it has none."""
-    found = next(outside(line, _REMARK), None)
-    return found.start() if found else len(line)
+    match = next(outside(line, _REMARK), None)
+    return match.start() if match else len(line)
 
 
 def commented(text: str) -> str:
     """Return why a line with a mark of a remark outside quotation marks is not sent; empty for any other line."""
-    found = next(outside(text, MARKS), None)
+    match = next(outside(text, MARKS), None)
     hint = 'leave it out (a text is in ")'
-    return f"{found[0]} begins a comment, which only program files have; {hint}; nothing was sent" if found else ""
+    return f"{match[0]} begins a comment, which only program files have; {hint}; nothing was sent" if match else ""
 
 
 def formatted(text: str) -> str:
@@ -124,14 +132,14 @@ def formatted(text: str) -> str:
 
     def spell(statement: str) -> str:
         spelled = canonical(statement, names)
-        return spelled if len(spelled) <= LONGEST else statement
+        return spelled if len(spelled) <= LONGEST_PROGRAM_LINE else statement
 
     return respelled(text, remark_at, spell)
 
 
 def unsendable(text: str) -> int | None:
     """Find the first character that cannot be sent: neither printable ASCII nor TAB; None for none."""
-    return next((at for at, each in enumerate(text) if each != "\t" and not " " <= each <= "~"), None)
+    return next((at for at, character in enumerate(text) if character != "\t" and not " " <= character <= "~"), None)
 
 
 def _unsendable(line: ProgramLine, raw: str, names: frozenset[str]) -> Iterator[Problem]:
@@ -144,9 +152,9 @@ def _unsendable(line: ProgramLine, raw: str, names: frozenset[str]) -> Iterator[
     at = unsendable(line.text)
     if at is not None:
         yield Problem(line.number, line.column + at, f"{line.text[at]!r} cannot be sent", "MCode is plain ASCII")
-    if len(line.text) > LONGEST:
-        what = f"{len(line.text)} characters without the remark; a drive takes {LONGEST}"
-        yield Problem(line.number, line.column + LONGEST, what, "split the line")
+    if len(line.text) > LONGEST_PROGRAM_LINE:
+        what = f"{len(line.text)} characters without the remark; a drive takes {LONGEST_PROGRAM_LINE}"
+        yield Problem(line.number, line.column + LONGEST_PROGRAM_LINE, what, "split the line")
     try:
         check_groups(line.text, names)
     except LineError as wrong:
@@ -223,13 +231,13 @@ def _holds_value(word: str, names: frozenset[str]) -> bool:
 # The parts of a line of an MCode program for an editor, and the places at which a program can begin.
 
 
-def parts(line: str) -> list[Part]:
+def parts(line: str) -> list[LinePart]:
     end = remark_at(line)
-    found = tokens(line[:end])
-    declares = bool(found) and found[0].text.upper() in DECLARING
-    kinds = [(token, _kind(token, number, declares)) for number, token in enumerate(found)]
-    shown = [Part(token.start, token.stop, kind) for token, kind in kinds if kind]
-    return [*shown, Part(end, len(line), "remark")] if end < len(line) else shown
+    line_tokens = tokens(line[:end])
+    declares = bool(line_tokens) and line_tokens[0].text.upper() in DECLARING
+    kinds = [(token, _kind(token, number, declares)) for number, token in enumerate(line_tokens)]
+    shown = [LinePart(token.start, token.stop, kind) for token, kind in kinds if kind]
+    return [*shown, LinePart(end, len(line), "remark")] if end < len(line) else shown
 
 
 def _kind(token: Token, number: int, declares: bool) -> str:
@@ -245,9 +253,9 @@ def _kind(token: Token, number: int, declares: bool) -> str:
     return "starts" if number == 0 and row.name in TURNING else "word"
 
 
-def entries(text: str) -> list[Entry]:
+def entries(text: str) -> list[ProgramEntry]:
     return [
-        Entry(line.declares, line.number, f"EX {line.declares}")
+        ProgramEntry(line.declares, line.number, f"EX {line.declares}")
         for line in scan(text)[0]
         if line.section == "program" and line.declares and line.text[:2].upper() == "LB"
     ]

@@ -10,14 +10,14 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.program_files import Problem, nearest, walk, way_to
-from multidrop.families.lexium.manual.grammar import Argument, Name, Number, Statement, words
+from multidrop.families.lexium.manual.grammar import Argument, NameTerm, Number, Statement, words
 from multidrop.families.lexium.manual.groups import CONDITIONAL, HOLDING, HOMINGS, MOVES, PLACES, WATCHING
 from multidrop.families.lexium.manual.program_file import ProgramLine
 from multidrop.families.lexium.manual.table import lookup
 
 
 @dataclass(frozen=True)
-class Step:
+class FlowStep:
     """A line of a program. `statement` is None for a line with an error; `follows` is False at a program's first."""
 
     line: ProgramLine
@@ -47,7 +47,7 @@ class Flow:
     def __init__(
         self, lines: Sequence[ProgramLine], statements: Mapping[int, Statement], names: Container[str]
     ) -> None:
-        self.steps: list[Step] = []
+        self.steps: list[FlowStep] = []
         self.labels: dict[str, int] = {}
         self._starts: dict[str, int] = {}
         follows = False
@@ -60,7 +60,7 @@ class Flow:
                 continue
             statement = statements.get(line.number)
             word = statement.word if statement is not None and statement.word not in names else ""
-            step = Step(line, statement, word, follows)
+            step = FlowStep(line, statement, word, follows)
             if step.label:
                 self.labels.setdefault(step.label, len(self.steps))
             self.steps.append(step)
@@ -85,10 +85,10 @@ class Flow:
     def place(self, statement: Statement) -> int | None:
         """The step that a statement goes to or names; None where the text does not show it."""
         target = self._target(statement)
-        if isinstance(target, Name):
+        if isinstance(target, NameTerm):
             return self.labels.get(target.word)
-        found = self._starts.get(str(target.value)) if isinstance(target, Number) else None
-        return found if found is not None and found < len(self.steps) else None
+        start = self._starts.get(str(target.value)) if isinstance(target, Number) else None
+        return start if start is not None and start < len(self.steps) else None
 
     def next(self, at: int) -> int | None:
         following = at + 1
@@ -124,7 +124,7 @@ def check_paths(flow: Flow, mentioned: Container[str]) -> Iterator[Problem]:
             yield _warn(step, "the program runs on past this line, its last one", "end it with E")
     if not flow.hidden:
         # Report the first line of each part that no path reaches.
-        reported: Step | None = None
+        reported: FlowStep | None = None
         for at, away in dead.items():
             step = flow.steps[at]
             if away is not reported and step.word not in ("E", "RT"):
@@ -144,14 +144,14 @@ def check_paths(flow: Flow, mentioned: Container[str]) -> Iterator[Problem]:
             yield _without_call(flow, begin, end) if place is None else _into(flow, source, place, end)
 
 
-def _warn(step: Step, what: str, hint: str) -> Problem:
+def _warn(step: FlowStep, what: str, hint: str) -> Problem:
     return Problem(step.line.number, step.line.column, what, hint, warning=True)
 
 
-def _dead(flow: Flow) -> dict[int, Step]:
+def _dead(flow: Flow) -> dict[int, FlowStep]:
     """The lines between one that leads elsewhere and the next label, each with the former."""
-    dead: dict[int, Step] = {}
-    away: Step | None = None
+    dead: dict[int, FlowStep] = {}
+    away: FlowStep | None = None
     for at, step in enumerate(flow.steps):
         if not step.follows or step.statement is None or step.label:
             away = None
@@ -220,9 +220,9 @@ def check_moves(flow: Flow) -> Iterator[Problem]:
         def disturbs(place: int) -> bool:
             return _disturbs(flow.steps[place])
 
-        found = nearest(flow.ways(at), ways, disturbs, FARTHEST)
-        if found is not None:
-            other = flow.steps[found]
+        ahead = nearest(flow.ways(at), ways, disturbs, FARTHEST)
+        if ahead is not None:
+            other = flow.steps[ahead]
             if other is step:
                 what = f"the next {step.line.text} begins before this one has ended"
             else:
@@ -230,7 +230,7 @@ def check_moves(flow: Flow) -> Iterator[Problem]:
             yield Problem(step.line.number, step.line.column, what, "H is missing after it", warning=True)
 
 
-def _has_an_end(step: Step) -> bool:
+def _has_an_end(step: FlowStep) -> bool:
     """Whether it starts a move that ends by itself; with a third parameter MA and MR go on."""
     if step.statement is None or not step.statement.arguments:
         return False
@@ -238,7 +238,7 @@ def _has_an_end(step: Step) -> bool:
     return step.word in HOMINGS or (step.word in MOVES and goes_on in ((), (Number(0),), (None,)))
 
 
-def _disturbs(step: Step) -> bool:
+def _disturbs(step: FlowStep) -> bool:
     if step.statement is None:
         return False
     if not step.statement.word:
@@ -266,7 +266,7 @@ def _waits(flow: Flow, at: int, move: int) -> bool:
     return not step.unconditional and move < place <= at
 
 
-def _is_busy(step: Step) -> bool:
+def _is_busy(step: FlowStep) -> bool:
     """Whether a subroutine with this line may wait: it holds, watches the motion, moves, or calls another."""
     calm = step.statement is not None and step.word not in HOLDING - {"RT"} and step.word != "CL"
     return not calm or _disturbs(step) or bool(words(step.line.text) & WATCHING)

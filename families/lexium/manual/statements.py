@@ -9,15 +9,15 @@ from string import ascii_lowercase, ascii_uppercase, digits
 from multidrop.families.lexium.manual.grammar import (
     LOGIC,
     Argument,
-    Binary,
+    BinaryTerm,
     Compare,
     Expression,
     LineError,
-    Name,
+    NameTerm,
     Number,
     Statement,
     Text,
-    Unary,
+    UnaryTerm,
     parse,
     tokens,
 )
@@ -40,12 +40,12 @@ def canonical(text: str, names: Container[str] = ()) -> str:
     try:
         statement = parse(text, names)
     except LineError:
-        return text[: next((each.start for each in tokens(text) if each.kind == "remark"), None)].strip(" \t")
+        return text[: next((token.start for token in tokens(text) if token.kind == "remark"), None)].strip(" \t")
     return spelled(statement, names) if statement is not None else ""
 
 
 def spelled(statement: Statement, names: Container[str] = ()) -> str:
-    arguments = ",".join(_spelled(each) for each in statement.arguments)
+    arguments = ",".join(_spelled(argument) for argument in statement.arguments)
     end = ";" if statement.quiet else ""
     between = "=" if _takes_equals(statement, names) else " " if statement.word and arguments else ""
     return f"{statement.word}{between}{arguments}{end}"
@@ -67,11 +67,11 @@ def _spelled(part: Argument | None) -> str:
             return f'"{value}"' if quoted else value
         case Number(value):
             return repr(value).upper()
-        case Name(word):
+        case NameTerm(word):
             return word
-        case Unary(op, operand):
+        case UnaryTerm(op, operand):
             return f"{op} {_spelled(operand)}" if op.isalnum() or op.endswith("_") else f"{op}{_spelled(operand)}"
-        case Binary(op, left, right) | Compare(op, left, right):
+        case BinaryTerm(op, left, right) | Compare(op, left, right):
             return f"{_spelled(left)}{op}{_spelled(right)}"
 
 
@@ -91,14 +91,14 @@ def condition_of(statement: Statement) -> Expression | None:
 
 
 def compares(expression: Argument) -> bool:
-    return any(isinstance(each, Compare) for each in _within(expression))
+    return any(isinstance(text, Compare) for text in _within(expression))
 
 
 def is_mixed(condition: Expression) -> bool:
     """Whether it exceeds the manual's form: several comparisons, or a comparison beside logic."""
     parts = list(_within(condition))
-    comparisons = sum(isinstance(each, Compare) for each in parts)
-    logic = any(isinstance(each, Binary | Unary) and each.op in (*LOGIC, "!") for each in parts)
+    comparisons = sum(isinstance(part, Compare) for part in parts)
+    logic = any(isinstance(part, BinaryTerm | UnaryTerm) and part.op in (*LOGIC, "!") for part in parts)
     return comparisons > 1 or (comparisons == 1 and logic)
 
 
@@ -107,24 +107,24 @@ def condition_reading(condition: Expression) -> str:
     match condition:
         case Number(value):
             return str(value)
-        case Name(word):
+        case NameTerm(word):
             return word
-        case Unary(op, operand):
+        case UnaryTerm(op, operand):
             return f"{op} {_inner(operand)}" if op in FUNCTIONS else op + _inner(operand)
-        case Binary(op, left, right) | Compare(op, left, right):
+        case BinaryTerm(op, left, right) | Compare(op, left, right):
             return _inner(left) + op + _inner(right)
 
 
 def _inner(part: Expression) -> str:
-    bracketed = isinstance(part, Binary | Compare) or (isinstance(part, Unary) and part.op == "!")
+    bracketed = isinstance(part, BinaryTerm | Compare) or (isinstance(part, UnaryTerm) and part.op == "!")
     return f"({condition_reading(part)})" if bracketed else condition_reading(part)
 
 
 def _within(expression: Argument) -> Iterator[Argument]:
     yield expression
-    if isinstance(expression, Unary):
+    if isinstance(expression, UnaryTerm):
         yield from _within(expression.operand)
-    elif isinstance(expression, Binary | Compare):
+    elif isinstance(expression, BinaryTerm | Compare):
         yield from _within(expression.left)
         yield from _within(expression.right)
 
@@ -140,7 +140,13 @@ def size_of(statement: Statement, product: str = "") -> int:
     """Bytes that a line takes in program memory; a product's words take one, names take three."""
     head = 1 if lookup(statement.word, product) else 3
     commas = max(len(statement.arguments) - 1, 0)
-    return head + sum(_argument_size(each, product) for each in statement.arguments) + commas + int(statement.quiet) + 1
+    return (
+        head
+        + sum(_argument_size(argument, product) for argument in statement.arguments)
+        + commas
+        + int(statement.quiet)
+        + 1
+    )
 
 
 def _argument_size(argument: Argument | None, product: str) -> int:
@@ -149,13 +155,13 @@ def _argument_size(argument: Argument | None, product: str) -> int:
             return 0
         case Number(value):
             return 9 if isinstance(value, float) else 2 if -128 <= value < 128 else 3 if abs(value) < 32768 else 5
-        case Name(word):
+        case NameTerm(word):
             return 1 if lookup(word, product) else 3
         case Text(value):
             return 2 + len(value)
-        case Unary(_, operand):
+        case UnaryTerm(_, operand):
             return 1 + _argument_size(operand, product)
-        case Binary(_, left, right) | Compare(_, left, right):
+        case BinaryTerm(_, left, right) | Compare(_, left, right):
             return 1 + _argument_size(left, product) + _argument_size(right, product)
 
 
@@ -187,13 +193,13 @@ def device_name(argument: Argument | None, quoted_only: bool) -> str:
     return value if len(value) == 1 and value.isascii() and value.isalnum() else ""
 
 
-def names_in(part: Argument | None) -> Iterator[Name]:
+def names_in(part: Argument | None) -> Iterator[NameTerm]:
     match part:
-        case Name():
+        case NameTerm():
             yield part
-        case Unary(_, operand):
+        case UnaryTerm(_, operand):
             yield from names_in(operand)
-        case Binary(_, left, right) | Compare(_, left, right):
+        case BinaryTerm(_, left, right) | Compare(_, left, right):
             yield from names_in(left)
             yield from names_in(right)
 
@@ -203,15 +209,15 @@ def words_of(statement: Statement) -> Iterator[str]:
     if statement.word:
         yield statement.word
     for argument in statement.arguments:
-        yield from (each.word for each in names_in(argument))
+        yield from (name.word for name in names_in(argument))
         yield from _functions(argument)
 
 
 def _functions(part: Argument | None) -> Iterator[str]:
     match part:
-        case Unary(op, operand):
+        case UnaryTerm(op, operand):
             yield from (op,) if op in FUNCTIONS else ()
             yield from _functions(operand)
-        case Binary(_, left, right) | Compare(_, left, right):
+        case BinaryTerm(_, left, right) | Compare(_, left, right):
             yield from _functions(left)
             yield from _functions(right)

@@ -33,8 +33,8 @@ HINT = "this drive refuses it"
 @lru_cache(maxsize=64)
 def firmware(version: str) -> tuple[int, int] | None:
     """The firmware of a Lexium by what VR prints; None where that does not show it."""
-    found = _VERSION.match(version)
-    return (int(found[1]), int(found[2])) if found else None
+    match = _VERSION.match(version)
+    return (int(match[1]), int(match[2])) if match else None
 
 
 def lacks(row: Mnemonic, version: str, part: str) -> str:
@@ -51,7 +51,7 @@ def unsupported(text: str, product: str, version: str, part: str) -> list[Proble
     """Warn of what a program file uses and one unit lacks; each word once."""
     lines, _ = program_file.scan(text)
     names = frozenset(line.declares for line in lines if line.declares)
-    found, told = list[Problem](), set[str]()
+    problems, told = list[Problem](), set[str]()
     for line in lines if product in LEXIUM else ():
         statement = parsed(line.text, names)
         if statement is None:
@@ -60,11 +60,11 @@ def unsupported(text: str, product: str, version: str, part: str) -> list[Proble
         for why in _reasons(statement, names, product, version, part):
             if why not in told:
                 told.add(why)
-                found.append(Problem(line.number, column, why, HINT, warning=True))
+                problems.append(Problem(line.number, column, why, HINT, warning=True))
         if statement.word == "RD" and statement.arguments and (own := firmware(version)) and own < SAFE_REVERSAL:
             what = f"RD may cause unintended MOTION with firmware {_shown(own)}"
-            found.append(Problem(line.number, column, what, "update the firmware to 5.009 or newer", warning=True))
-    return in_order(found)
+            problems.append(Problem(line.number, column, what, "update the firmware to 5.009 or newer", warning=True))
+    return in_order(problems)
 
 
 def _reasons(statement: Statement, names: Container[str], product: str, version: str, part: str) -> Iterator[str]:
@@ -72,7 +72,7 @@ def _reasons(statement: Statement, names: Container[str], product: str, version:
         row = lookup(word, product) if word not in names else None
         if row is not None and (why := lacks(row, version, part)):
             yield why
-    word, numbers = statement.word, [_whole(each) for each in statement.arguments]
+    word, numbers = statement.word, [_whole(argument) for argument in statement.arguments]
     own, small = firmware(version), _SMALL_PART.match(part) is not None
     if word == "IS" and own is not None and own < FIRST_WITH_CLOCKS and CLOCKS & {*numbers[1:2]}:
         yield f"IS type {numbers[1]} needs firmware 6, and this drive has {_shown(own)}"

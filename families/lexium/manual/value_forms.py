@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import Scalar, Value
 from multidrop.families.lexium.manual.grammar import is_name
-from multidrop.families.lexium.manual.mnemonic import EVERY, INT_HIGH, INT_LOW, Form, Mnemonic
+from multidrop.families.lexium.manual.mnemonic import EVERY, INT_HIGH, INT_LOW, FormKind, Mnemonic
 
 MOST_REPEATS = 65000
 SETUP_FIELDS = 2
@@ -86,7 +86,7 @@ class FieldsForm(WordForm):
         numbers = [each for each in value if isinstance(each, int)] if isinstance(value, tuple) else []
         if not (isinstance(value, tuple) and len(value) == len(numbers) == count):
             raise self.refused(value, f"takes {count} whole numbers, as in {self.name} = {[0] * count}")
-        if any(not 0 <= each <= most for each, most in zip(numbers, greatest, strict=False)):
+        if any(not 0 <= number <= most for number, most in zip(numbers, greatest, strict=False)):
             raise Diagnostic(f"{self.name} = {numbers}: valid: up to {[*greatest]}")
 
 
@@ -119,17 +119,17 @@ class TripForm(WordForm):
             and len(target) == 1
             and isinstance(target[0], (int, str))
             and len(repeats) <= row.setup.repeated
-            and all(isinstance(each, int) and 0 <= each <= MOST_REPEATS for each in repeats)
+            and all(isinstance(repeat, int) and 0 <= repeat <= MOST_REPEATS for repeat in repeats)
         )
 
 
-FORMS: Mapping[Form, Callable[[str, Mnemonic, bool], WordForm]] = {
-    Form.NUMBER: NumberForm,
-    Form.OPTION: NumberForm,
-    Form.TEXT: NameForm,
-    Form.FIELDS: FieldsForm,
-    Form.LIST: ListForm,
-    Form.TRIP: TripForm,
+FORMS: Mapping[FormKind, Callable[[str, Mnemonic, bool], WordForm]] = {
+    FormKind.NUMBER: NumberForm,
+    FormKind.OPTION: NumberForm,
+    FormKind.TEXT: NameForm,
+    FormKind.FIELDS: FieldsForm,
+    FormKind.LIST: ListForm,
+    FormKind.TRIP: TripForm,
 }
 
 

@@ -20,10 +20,10 @@ from multidrop.families.lexium.manual.program_file import bare, commented, remar
 from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.instructions import Instructions
 from multidrop.families.lexium.simulator.motion.feedback import FIXED, VARIABLE
-from multidrop.families.lexium.simulator.motion.motor import Motor
+from multidrop.families.lexium.simulator.motion.motor import LexiumMotor
 from multidrop.families.lexium.simulator.motion.outputs import Outputs
 from multidrop.families.lexium.simulator.power import Nvm, Power
-from multidrop.families.lexium.simulator.state.errors import CRLF, Fault
+from multidrop.families.lexium.simulator.state.errors import CRLF, DriveFault
 from multidrop.families.lexium.simulator.state.interpreter import Core
 from multidrop.families.lexium.simulator.state.memory import Memory
 from multidrop.simulator.cell.spec import DriveSpec
@@ -40,7 +40,7 @@ parsed = lru_cache(maxsize=1024)(parse)
 """Clients that watch a drive send the same few lines again and again."""
 
 
-class Answer(NamedTuple):
+class PrintedAnswer(NamedTuple):
     """What a line printed: whole lines, what a PR that ends in a semicolon left, and whether it was refused."""
 
     lines: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class MCodeDevice(EventLoop):
         period = max(spec.instruction_us, SHORTEST_US) / 1e6
         core = Core(memory, world, period, lambda line: self.language.compile_stored(line))
         self.program, self.errors, self._mode = core.program, core.errors, core.mode
-        motor = Motor(core)
+        motor = LexiumMotor(core)
         outputs = Outputs(core, motor)
         motor.inputs.put_out = outputs.put_out
         self.nvm = Nvm(core, motor, outputs)
@@ -128,14 +128,14 @@ class MCodeDevice(EventLoop):
 
     # Lines.
 
-    def execute(self, text: str, now: float, *, immediate: bool = False) -> Answer:
+    def execute(self, text: str, now: float, *, immediate: bool = False) -> PrintedAnswer:
         """Carry out one line; in program mode store it, unless it is `immediate`. Never raises, whatever the text."""
         if self.calm and self.quiet(now, self.thread.running):  # nothing has happened since the last line
             self._timeline.now = max(self._timeline.now, now)
         else:
             self.advance(now)
         if not self.bridges.powered:
-            return Answer(refused=True)
+            return PrintedAnswer(refused=True)
         printer = self._printer
         printer.begin_answer()
         self.calm = refused = False
@@ -152,11 +152,11 @@ class MCodeDevice(EventLoop):
             else:
                 self.language.compile(statement, stored=True)
                 self._mode.store(statement, strip(text))
-        except (LineError, Fault) as error:
+        except (LineError, DriveFault) as error:
             refused = True
             self.interpreter.refuse(error.code, handle=immediate)
         *lines, tail = printer.end_answer().split(CRLF)
-        return Answer(tuple(lines), tail, refused)
+        return PrintedAnswer(tuple(lines), tail, refused)
 
     def fail(self, code: int, now: float) -> None:
         """Set an error that the port has found, such as a line that is too long."""
@@ -229,16 +229,16 @@ def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     device.memory.texts["DN"] = spec.name
     lines = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
     last = ("EE", "AS") if spec.set.get("AS") else ("AS",)
-    late = [each for name in last for each in lines if each[0] == name]
-    early = [each for each in lines if each not in late]
+    late = [assignment for name in last for assignment in lines if assignment[0] == name]
+    early = [assignment for assignment in lines if assignment not in late]
     for each in lines:
         _check_whole("=".join(each), f"{where}: set")
     refused = early
     for _ in range(PASSES):
-        again = [each for each in early if device.execute("=".join(each), 0.0).refused]
-        refused = [each for each in refused if each in again]
-    for each in (*late, *refused):
-        _accept(device, "=".join(each), f"{where}: set")
+        again = [assignment for assignment in early if device.execute("=".join(assignment), 0.0).refused]
+        refused = [assignment for assignment in refused if assignment in again]
+    for pair in (*late, *refused):
+        _accept(device, "=".join(pair), f"{where}: set")
     device.nvm.keep()
     inputs.watched = True
 

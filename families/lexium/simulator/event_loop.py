@@ -17,10 +17,10 @@ from math import inf, nextafter
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.grammar import Number
 from multidrop.families.lexium.simulator.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP
-from multidrop.families.lexium.simulator.motion.motor import Motor
+from multidrop.families.lexium.simulator.motion.motor import LexiumMotor
 from multidrop.families.lexium.simulator.motion.outputs import Outputs
 from multidrop.families.lexium.simulator.power import Power
-from multidrop.families.lexium.simulator.state.errors import Event, Fault, nothing, when
+from multidrop.families.lexium.simulator.state.errors import DriveFault, Event, nothing, when
 from multidrop.families.lexium.simulator.state.interpreter import Core
 
 JOGS = (JOG_PLUS, JOG_MINUS)
@@ -36,7 +36,7 @@ class EventLoop:
     whether the drive has power and is up.
     """
 
-    def __init__(self, core: Core, motor: Motor, outputs: Outputs, power: Power) -> None:
+    def __init__(self, core: Core, motor: LexiumMotor, outputs: Outputs, power: Power) -> None:
         self.core, self._timeline, self._printer, self.thread = core, core.timeline, core.printer, core.thread
         self.interpreter, self.motor, self._inputs, self.power_unit = core.interpreter, motor, motor.inputs, power
         self.output_lines, self.bridges = outputs, motor.bridges
@@ -180,7 +180,7 @@ class EventLoop:
                 self.power_unit.restart()
                 if thread.running:
                     thread.next_at = self._timeline.now + RESET_TIME
-        except Fault as fault:
+        except DriveFault as fault:
             self.interpreter.raise_error(fault.code)
 
     def wired(self, n: int, was: tuple[int, ...]) -> None:

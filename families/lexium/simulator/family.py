@@ -37,7 +37,7 @@ from multidrop.simulator.cell.drive_keys import (
 )
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted, shown
-from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
+from multidrop.simulator.cell.writer import CellEntry, DriveText, plain, remark
 from multidrop.simulator.family import Place, Shadow, SimulatedFamily, StoredProgram, Unit
 from multidrop.simulator.wire import Transmission
 from multidrop.simulator.world import REVOLUTION, World
@@ -92,18 +92,18 @@ def nearest(product: str) -> str:
     return "MDI"
 
 
-def _settings(readings: list[Reading], personality: str) -> Iterator[Entry]:
+def _settings(readings: list[Reading], personality: str) -> Iterator[CellEntry]:
     lists: dict[str, list[str]] = {}
-    for each in readings:
-        row = _LISTED.fullmatch(each.name)
+    for reading in readings:
+        row = _LISTED.fullmatch(reading.name)
         if row is not None:
-            lists.setdefault(row[1], []).append(f"{row[2]},{_fields(each.value)}")
-        elif _acceptable(each, personality) and not _unset(each, personality):
-            huge = isinstance(each.value, float) and abs(each.value) >= 2.0**63
-            held = _fields(each.value) if isinstance(each.value, tuple) else each.value
-            yield Entry(each.name, repr(each.value) if huge else held, remark(each))
+            lists.setdefault(row[1], []).append(f"{row[2]},{_fields(reading.value)}")
+        elif _acceptable(reading, personality) and not _unset(reading, personality):
+            huge = isinstance(reading.value, float) and abs(reading.value) >= 2.0**63
+            held = _fields(reading.value) if isinstance(reading.value, tuple) else reading.value
+            yield CellEntry(reading.name, repr(reading.value) if huge else held, remark(reading))
     for name, rows in lists.items():
-        yield Entry(name, rows)
+        yield CellEntry(name, rows)
 
 
 def _unset(reading: Reading, personality: str) -> bool:
@@ -154,7 +154,7 @@ def _placed(rows: Sequence[Row], personality: str, variables: Iterable[str]) -> 
 def _remarked(snapshot: Snapshot) -> list[Row]:
     """The program with the remarks and the layout of its file; a line that the drive does not store has no address."""
     addresses, rows = dict(snapshot.program), []
-    width = max((len(str(each)) for each in addresses), default=0)
+    width = max((len(str(address)) for address in addresses), default=0)
     for line in snapshot.remarked:
         place, text = line[:width].strip(), line[width + 2 :]
         rows.append((int(place) if place.isdecimal() else 0, text))
@@ -164,8 +164,8 @@ def _remarked(snapshot: Snapshot) -> list[Row]:
 
 def _names(rows: Iterable[Row], variables: Iterable[str]) -> frozenset[str]:
     """The labels and variables of a program."""
-    found = (_NAMED.match(text) for _, text in rows)
-    return frozenset((*variables, *(each[1].upper() for each in found if each is not None)))
+    matches = (_NAMED.match(text) for _, text in rows)
+    return frozenset((*variables, *(match[1].upper() for match in matches if match is not None)))
 
 
 DEFAULT = 96
@@ -208,7 +208,7 @@ def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:
 
 def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:
     """Set BD to the baud rate of the bus, where the cell file sets no other."""
-    code = next((code for code, each in BAUDS.items() if each == baud), DEFAULT)
+    code = next((code for code, rate in BAUDS.items() if rate == baud), DEFAULT)
     if code == DEFAULT or "BD" in spec.set or spec.personality in ETHERNET:
         return spec
     return replace(spec, set={"BD": code, **spec.set})
@@ -275,24 +275,28 @@ class SimulatedLexium(SimulatedFamily):
     @classmethod
     def describe(cls, snapshot: Snapshot) -> DriveText:
         personality = nearest(snapshot.product)
-        readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
-        users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
-        variables = {each.name: each.value for each in users if isinstance(each.value, int)}
+        readings = [reading for reading in snapshot.readings.readings if reading.name not in KEY_OF]
+        users = [
+            reading
+            for reading in readings
+            if reading.section == VARIABLES and lookup(reading.name, personality) is None
+        ]
+        variables = {value.name: value.value for value in users if isinstance(value.value, int)}
         model = MODELS[personality]
         lines, drift = _placed(_remarked(snapshot) or snapshot.program, personality, variables)
         remarks = [*snapshot.remarks, *drift]
         remarks += [
-            f"not in set: {each.name} = {each.value} (the simulator does not take it)"
-            for each in readings
-            if not (_acceptable(each, personality) or _unset(each, personality))
+            f"not in set: {reading.name} = {reading.value} (the simulator does not take it)"
+            for reading in readings
+            if not (_acceptable(reading, personality) or _unset(reading, personality))
         ]
         if personality != snapshot.product:
             remarks.insert(
                 0, f"the unit is an {snapshot.product}; the simulator knows none, and {personality} is the nearest"
             )
         texts = (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial))
-        identity = [Entry(key, plain(text)) for key, text in texts if text]
-        identity += [Entry(key, count) for key, (count,) in snapshot.counters.items()]
+        identity = [CellEntry(key, plain(text)) for key, text in texts if text]
+        identity += [CellEntry(key, count) for key, (count,) in snapshot.counters.items()]
         world: dict[str, object] = {}
         if snapshot.inputs:
             world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
@@ -305,8 +309,8 @@ class SimulatedLexium(SimulatedFamily):
             remarks=remarks,
             unread=snapshot.readings.unread,
             program=lines,
-            settings=[*_settings([each for each in readings if each.name not in variables], personality)],
-            variables=[Entry(name, held) for name, held in variables.items()],
+            settings=[*_settings([reading for reading in readings if reading.name not in variables], personality)],
+            variables=[CellEntry(name, held) for name, held in variables.items()],
             identity=identity,
             worlds={"": world} if world else {},
             ethernet=model.ethernet,
@@ -316,19 +320,19 @@ class SimulatedLexium(SimulatedFamily):
     @classmethod
     def wanted(cls, spec: DriveSpec) -> dict[str, Value]:
         """Return the settings of a drive in a cell file. No line gives a drive the name !; FD does."""
-        found: dict[str, Value] = {**spec.variables}
+        settings: dict[str, Value] = {**spec.variables}
         if not MODELS[spec.personality].ethernet:
-            found |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
+            settings |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
         for name, held in spec.set.items():
             if name in LISTS:
                 for row in held if isinstance(held, tuple) else (str(held),):
                     number, *fields = row.split(",")
-                    found[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))
+                    settings[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))
             elif isinstance(held, str) and "," in held:
-                found[name] = tuple(map(_scalar, held.split(",")))
+                settings[name] = tuple(map(_scalar, held.split(",")))
             elif not isinstance(held, tuple):
-                found[name] = _scalar(held) if isinstance(held, str) else held
-        return found
+                settings[name] = _scalar(held) if isinstance(held, str) else held
+        return settings
 
     @classmethod
     def program(cls, spec: DriveSpec) -> StoredProgram:

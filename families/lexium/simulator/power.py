@@ -8,16 +8,16 @@ Manual 3.4.4, 5.1.45, 5.1.63, 5.1.113, 5.1.121, 5.1.127.
 from __future__ import annotations
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Name
+from multidrop.families.lexium.manual.grammar import NameTerm
 from multidrop.families.lexium.manual.groups import UNIT
 from multidrop.families.lexium.simulator.motion.axis import MOVES
 from multidrop.families.lexium.simulator.motion.counters import FRESH
-from multidrop.families.lexium.simulator.motion.motor import Motor
+from multidrop.families.lexium.simulator.motion.motor import LexiumMotor
 from multidrop.families.lexium.simulator.motion.outputs import Outputs
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.interpreter import Core
-from multidrop.families.lexium.simulator.state.memory import Memory, Store
-from multidrop.families.lexium.simulator.state.program_memory import Program
+from multidrop.families.lexium.simulator.state.memory import Memory, NonVolatileMemory
+from multidrop.families.lexium.simulator.state.program_memory import ProgramContents
 
 ETHERNET_BOOT = 20.0
 """Seconds, of the device's own time."""
@@ -29,10 +29,10 @@ BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 class Nvm:
     """NVM of one drive. A product with `lasting_programs` keeps each program line at once, without S."""
 
-    def __init__(self, core: Core, motor: Motor, outputs: Outputs) -> None:
+    def __init__(self, core: Core, motor: LexiumMotor, outputs: Outputs) -> None:
         self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
         self._motor, self._outputs = motor, outputs
-        self.store = Store(program=self._kept(Program(product=core.memory.product)))
+        self.store = NonVolatileMemory(program=self._kept(ProgramContents(product=core.memory.product)))
 
     @property
     def locked(self) -> bool:
@@ -42,20 +42,20 @@ class Nvm:
     def save(self) -> None:
         """S. Raises Fault (73)."""
         if self._moving() and self._motor.axis.kind in MOVES:
-            raise Fault(E.MOVING_SAVE)
+            raise DriveFault(E.MOVING_SAVE)
         self.keep()
 
     def initialise(self) -> None:
         """IP. Raises Fault (74)."""
         if self._moving():
-            raise Fault(E.MOVING_CLEAR)
+            raise DriveFault(E.MOVING_CLEAR)
         self.load()
 
     def erase(self) -> None:
         """Reset NVM to factory defaults, except what these leave alone. Raises Fault (73)."""
         if self._moving():
-            raise Fault(E.MOVING_SAVE)
-        fresh, kept = Store(program=self._kept(Program(product=self._memory.product))), self.store
+            raise DriveFault(E.MOVING_SAVE)
+        fresh, kept = NonVolatileMemory(program=self._kept(ProgramContents(product=self._memory.product))), self.store
         Memory(self._memory.product).save(fresh)
         fresh.values.update({name: value for name, value in kept.values.items() if name in UNIT})
         fresh.texts.update({name: value for name, value in kept.texts.items() if name in UNIT})
@@ -82,14 +82,14 @@ class Nvm:
     def _moving(self) -> bool:
         return self._motor.status.moving(self._timeline.now)
 
-    def _kept(self, program: Program) -> Program:
+    def _kept(self, program: ProgramContents) -> ProgramContents:
         return self._program if self._memory.model.lasting_programs else program
 
 
 class Power:
     """The supply of one drive. `boots_at` is when one that begins again will be up; `boots` counts its beginnings."""
 
-    def __init__(self, core: Core, motor: Motor, outputs: Outputs, nvm: Nvm) -> None:
+    def __init__(self, core: Core, motor: LexiumMotor, outputs: Outputs, nvm: Nvm) -> None:
         self._core, self._timeline = core, core.timeline
         self._motor, self._outputs, self.nvm, self._bridges = motor, outputs, nvm, motor.bridges
         self.boots_at: float | None = None
@@ -148,7 +148,7 @@ class Power:
             prompts = core.model.prompts_at_start and memory.echo_mode == 0 and not memory.checksum
             core.printer.announce(core.model.sign_on + (PROMPT if prompts else ""))
         if "SU" in core.program.labels:
-            core.interpreter.start(Name("SU"), t)
+            core.interpreter.start(NameTerm("SU"), t)
 
     def _go_down(self) -> None:
         self._motor.stop(self._timeline.now)

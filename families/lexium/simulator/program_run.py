@@ -17,16 +17,24 @@ from multidrop.dialects.program_files import Problem, errors
 from multidrop.families.lexium.manual import program_file
 from multidrop.families.lexium.manual.errors import ErrorNumber
 from multidrop.families.lexium.manual.errors import text as text_of_error
-from multidrop.families.lexium.manual.grammar import Name, Number, parsed, words
+from multidrop.families.lexium.manual.grammar import NameTerm, Number, parsed, words
 from multidrop.families.lexium.manual.help import remedy
 from multidrop.families.lexium.manual.program_file import ProgramLine
 from multidrop.families.lexium.manual.statements import size_of
 from multidrop.families.lexium.simulator.device import MCodeDevice
-from multidrop.families.lexium.simulator.state.errors import CRLF, Failure, Fault
-from multidrop.families.lexium.simulator.state.program_memory import SPACE, Program
+from multidrop.families.lexium.simulator.state.errors import CRLF, DriveFault, RecordedError
+from multidrop.families.lexium.simulator.state.program_memory import PROGRAM_BYTES, ProgramContents
 from multidrop.families.lexium.simulator.stored_setups import refused_later
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.program_events import BreakPoint, Debugging, Event, Recorder, Summary, Value, Values
+from multidrop.simulator.program_events import (
+    BreakPoint,
+    DebugWishes,
+    ProgramEvent,
+    RunRecorder,
+    Summary,
+    Value,
+    Values,
+)
 from multidrop.simulator.program_run import ProgramRun, Reader
 from multidrop.simulator.world import World
 
@@ -35,12 +43,15 @@ LAST_ADDRESS = 99_999
 LAST_LINE = 999_999
 
 
-def printed(t: float, text: str) -> Event:
+def printed(t: float, text: str) -> ProgramEvent:
     """A line that the drive has printed, and when it was complete; what would act on a terminal is escaped."""
     shown = text
     if not text.isprintable():
-        shown = "".join(each if each.isprintable() or each == "\t" else f"\\x{ord(each):02x}" for each in text)
-    return Event(t, {"print": text}, shown)
+        shown = "".join(
+            character if character.isprintable() or character == "\t" else f"\\x{ord(character):02x}"
+            for character in text
+        )
+    return ProgramEvent(t, {"print": text}, shown)
 
 
 class MCodeRun(ProgramRun):
@@ -60,8 +71,8 @@ class MCodeRun(ProgramRun):
         self._device = MCodeDevice(replace(spec, program="", program_name=""), World(spec.world))
         self._interpreter, self._program = self._device.interpreter, self._device.program
         self.running = self._device.thread
-        self._failures: list[Failure] = []
-        self._last: Failure | None = None
+        self._failures: list[RecordedError] = []
+        self._last: RecordedError | None = None
         self._device.errors.failures = self._failures
         self._device.prints()
         self._stored: dict[int, ProgramLine] = {}
@@ -77,18 +88,18 @@ class MCodeRun(ProgramRun):
     def refusals(cls, text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
         return refusals(text, file, personality, found)
 
-    def refused(self) -> Iterator[Event]:
+    def refused(self) -> Iterator[ProgramEvent]:
         """Load the file without running it; return the refused lines. A refused PG counts as PG 1."""
-        return (each for each in self.load(anywhere=True) if each.problem)
+        return (event for event in self.load(anywhere=True) if event.problem)
 
     @property
-    def program(self) -> Program:
+    def program(self) -> ProgramContents:
         """The program that was stored."""
         return self._program
 
     # Loading.
 
-    def load(self, anywhere: bool = False) -> Iterator[Event]:
+    def load(self, anywhere: bool = False) -> Iterator[ProgramEvent]:
         device = self._device
         for line in self._lines:
             if anywhere and device.programming is None and line.section == "program" and line.mark is None:
@@ -103,14 +114,14 @@ class MCodeRun(ProgramRun):
             if answer.refused:
                 code = self._failures[-1].code
                 self.errors.append(code)
-                yield self._failed(Failure(0.0, code, 0), line, "refused")
+                yield self._failed(RecordedError(0.0, code, 0), line, "refused")
                 if address is None and line.section == "program" and not anywhere:
                     return
             elif address is not None:
                 self._stored[address] = line
         self._failures.clear()
 
-    def begin(self, label: str, debugging: Debugging) -> None:
+    def begin(self, label: str, debugging: DebugWishes) -> None:
         """Start at a label or an address (SU, else address 1).
 
         A download takes longer than a calibration that its header has begun (AS).
@@ -120,11 +131,11 @@ class MCodeRun(ProgramRun):
         if not device.running or label:
             device.core.thread.finish()
             labels, address = self._program.labels, whole(label, 0, LAST_ADDRESS)
-            default = Name("SU") if "SU" in labels else Number(FIRST_ADDRESS)
+            default = NameTerm("SU") if "SU" in labels else Number(FIRST_ADDRESS)
             try:
-                named = Number(address) if address is not None else Name(label.upper())
+                named = Number(address) if address is not None else NameTerm(label.upper())
                 self._interpreter.start(named if label else default, 0.0)
-            except Fault:
+            except DriveFault:
                 what = f"nothing to run at {label}" if label else "no SU, and nothing at address 1"
                 there = ", ".join(sorted(labels)) or "it has none"
                 hint = f"valid for --run: an address, or a label of the program ({there})"
@@ -132,7 +143,7 @@ class MCodeRun(ProgramRun):
         index = self._interpreter.linked.index
         self._executed = {index[at]: line for at, line in sorted(self._stored.items()) if at in index}
         if debugging.wanted:
-            self.recorder = self.recording(debugging, Recorder)
+            self.recorder = self.recording(debugging, RunRecorder)
             self._interpreter.watch(self._before, self._after)
         elif debugging.outputs:
             self._interpreter.watch(None, self._switched)
@@ -143,11 +154,11 @@ class MCodeRun(ProgramRun):
         return self._device.language.reader(name)
 
     def values(self, readers: Mapping[str, Reader]) -> Values:
-        found: dict[str, Value] = {}
+        values: dict[str, Value] = {}
         for name, read in readers.items():
-            with suppress(Fault):  # a variable that is not declared yet is left out
-                found[name] = read()
-        return found
+            with suppress(DriveFault):  # a variable that is not declared yet is left out
+                values[name] = read()
+        return values
 
     def unnamed(self, trace: bool) -> Values:
         return self._device.memory.values if trace else {}
@@ -159,20 +170,20 @@ class MCodeRun(ProgramRun):
         else:
             address = next((at for at, line in self._stored.items() if line.number == number), None)
         index = self._interpreter.linked.index
-        found = self._executed.get(index.get(address, -1)) if address is not None else None
-        if found is None:
+        executed = self._executed.get(index.get(address, -1)) if address is not None else None
+        if executed is None:
             hint = f"valid: a line of the program, or a label ({', '.join(sorted(labels)) or 'none'})"
             raise Diagnostic(f"no line to break at {point.place}", self.file, hint)
-        return found.number
+        return executed.number
 
     def _before(self, line: int) -> bool:
-        found, recorder = self._executed.get(line), self.recorder
-        return found is not None and recorder is not None and recorder.reaches(self._device.now, found.number)
+        executed, recorder = self._executed.get(line), self.recorder
+        return executed is not None and recorder is not None and recorder.reaches(self._device.now, executed.number)
 
     def _after(self, line: int) -> None:
-        found, recorder = self._executed.get(line), self.recorder
-        if found is not None and recorder is not None:
-            recorder.after(self._device.now, found.number)
+        executed, recorder = self._executed.get(line), self.recorder
+        if executed is not None and recorder is not None:
+            recorder.after(self._device.now, executed.number)
 
     def unwatch(self) -> None:
         self._interpreter.watch(None, None)
@@ -183,7 +194,7 @@ class MCodeRun(ProgramRun):
         if active != self._active:
             self._active = active
             text = f"active outputs: {', '.join(map(str, active)) or 'none'}"
-            self.events.append(Event(device.now, {"outputs": list(active)}, text))
+            self.events.append(ProgramEvent(device.now, {"outputs": list(active)}, text))
 
     # Running.
 
@@ -193,10 +204,10 @@ class MCodeRun(ProgramRun):
     def advance(self) -> None:
         self._device.advance(self.now, program=True)
 
-    def happened(self) -> Iterator[Event]:
+    def happened(self) -> Iterator[ProgramEvent]:
         for t, text in self._device.prints():
             *whole, self._held = (self._held + text).split(CRLF)
-            yield from (printed(t, each) for each in whole)
+            yield from (printed(t, line) for line in whole)
         for failure in self._failures:
             yield self._failed(failure, self._at(failure.line), f"at {failure.t:.4f} s")
             if not failure.handled:
@@ -204,7 +215,7 @@ class MCodeRun(ProgramRun):
         self._last = self._failures[-1] if self._failures else self._last
         self._failures.clear()
 
-    def rest(self) -> Iterator[Event]:
+    def rest(self) -> Iterator[ProgramEvent]:
         if self._held:
             yield printed(self._device.now, self._held)
 
@@ -212,12 +223,12 @@ class MCodeRun(ProgramRun):
         last = self._last
         return "error" if last is not None and last.t == self._device.now and not last.handled else self.complete
 
-    def _failed(self, failure: Failure, line: ProgramLine, when: str) -> Event:
+    def _failed(self, failure: RecordedError, line: ProgramLine, when: str) -> ProgramEvent:
         """An error of the drive; `handled` is one that a subroutine of OE took."""
         facts = {"error": failure.code, "line": line.number, **({"handled": True} if failure.handled else {})}
         handled = " (OE has handled it)" if failure.handled else ""
         text = f"{line.text}: {when}: {meaning(failure.code, self._personality)}{handled}"
-        return Event(failure.t, facts, text, line.number, problem=True)
+        return ProgramEvent(failure.t, facts, text, line.number, problem=True)
 
     def _at(self, index: int) -> ProgramLine:
         """Find the line of the file for a line of the interpreter; after the program's end, the last one before."""
@@ -226,7 +237,7 @@ class MCodeRun(ProgramRun):
         return self._executed.get(index, self._lines[0])
 
     def failed(self) -> str:
-        return f"errors {', '.join(str(each) for each in self.errors)}"
+        return f"errors {', '.join(str(error) for error in self.errors)}"
 
     def summary(self, ended: str, until: float | None) -> Summary:
         device = self._device
@@ -253,10 +264,10 @@ def meaning(code: int, personality: str) -> str:
 def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
     """Find what a simulated drive refuses of the lines without a problem so far."""
     lines, unready = program_file.scan(text)
-    wrong = {each.line for each in errors(found)}
+    wrong = {error.line for error in errors(found)}
     tried = [line for line in lines if line.number not in wrong or line.mark is not None]
     if all(line.section != "program" for line in lines):  # what follows its first line is of the program, not typed
-        begins = min((each.line for each in errors(unready)), default=inf)
+        begins = min((error.line for error in errors(unready)), default=inf)
         tried = [line for line in tried if line.number < begins]
     missing = {line.declares for line in lines if line.number in wrong}
     problems, numbered = [], {line.number: line for line in lines}
@@ -270,7 +281,7 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
             what = f"{line.text}: {meaning(code, personality)}"
             problems.append(Problem(line.number, line.column, what, remedy(code, line.text, personality)))
         missing.add(line.declares)
-    told = {each.line for each in errors([*found, *problems])}
+    told = {error.line for error in errors([*found, *problems])}
     return [*problems, *_refused_later(run, lines, personality, told)]
 
 
@@ -287,5 +298,5 @@ def _refused_later(
 def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) -> Problem:
     inside = [each for each in lines if each.section == "program" and each.mark is None]
     size = sum(size_of(statement, personality) for each in inside if (statement := parsed(each.text)) is not None)
-    what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {SPACE}"
+    what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {PROGRAM_BYTES}"
     return Problem(line.number, line.column, what, "shorten the program; this line is the first without room")

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Sequence
 from typing import NamedTuple
 
-from multidrop.families.lexium.manual.grammar import Name, Statement, parsed
+from multidrop.families.lexium.manual.grammar import NameTerm, Statement, parsed
 from multidrop.families.lexium.manual.groups import CONDITIONAL, LABELLING, LAST_LINES, PLACES, SETUPS
 from multidrop.families.lexium.manual.program_file import ProgramLine
 from multidrop.families.lexium.manual.statements import names_in
 from multidrop.families.lexium.simulator.device import MCodeDevice
-from multidrop.families.lexium.simulator.state.program_memory import Program
+from multidrop.families.lexium.simulator.state.program_memory import ProgramContents
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.world import World
 
@@ -32,7 +32,7 @@ class RefusedLater(NamedTuple):
 
 
 def refused_later(
-    lines: Sequence[ProgramLine], program: Program, personality: str, wrong: Container[int]
+    lines: Sequence[ProgramLine], program: ProgramContents, personality: str, wrong: Container[int]
 ) -> Iterator[RefusedLater]:
     """Find them among the lines of a program that a drive holds; `wrong` are numbers of lines to leave out."""
     blank = fresh = _fresh(program, personality)
@@ -51,7 +51,7 @@ def refused_later(
         yield RefusedLater(line, code, _fresh(program, personality).execute(line.text, 0.0).refused)
 
 
-def _fresh(program: Program, personality: str) -> MCodeDevice:
+def _fresh(program: ProgramContents, personality: str) -> MCodeDevice:
     spec = DriveSpec(personality=personality)
     device = MCodeDevice(spec, World(spec.world))
     device.program.load(program)
@@ -63,5 +63,7 @@ def _plain(statement: Statement) -> bool:
     if statement.word not in SETUPS or not statement.arguments:
         return False
     place = PLACES.get(statement.word)
-    values = [each for at, each in enumerate(statement.arguments) if at != place or not isinstance(each, Name)]
-    return not any(True for each in values for _ in names_in(each))
+    values = [
+        argument for at, argument in enumerate(statement.arguments) if at != place or not isinstance(argument, NameTerm)
+    ]
+    return not any(True for value in values for _ in names_in(value))

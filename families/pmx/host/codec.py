@@ -15,11 +15,11 @@ from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, 
 from multidrop.dialects.state import DriveState
 from multidrop.families.pmx.manual.table import AXES, MOTIONS, PROGRAMS, axes_of, lookup, reads, starts_motion
 
-LONGEST = 62
+LONGEST_COMMAND = 62
 """Characters of a command with its number, and of a reply: the room in a USB packet, with the end."""
 FLASH = 5.0
 """Seconds for a write to flash."""
-GAP = 0.03
+STOP_PIECE_QUIET = 0.03
 """Seconds of quiet after a command of a stop, so that its reply does not collide with the next command."""
 FACTORY = "00"
 """The device number of a new unit."""
@@ -59,8 +59,10 @@ class Pmx(Codec):
         if self.addressed and not (len(address) == 2 and address.isascii() and address.isdigit()):
             raise Inexpressible(f"no device number '{address}'; valid: 00 to 99")
         size = len(address) + len(text) + 1
-        if size > LONGEST:
-            raise Inexpressible(f"the command has {size} characters with its number, {LONGEST} are sent at most")
+        if size > LONGEST_COMMAND:
+            raise Inexpressible(
+                f"the command has {size} characters with its number, {LONGEST_COMMAND} are sent at most"
+            )
         timeout = FLASH if WRITES_FLASH.match(text) else None
         value = TOKEN if STORED.fullmatch(text) else VALUE
         kind, expect = (Kind.PRINT, value) if reads(text) else (Kind.COMMAND, DONE if lookup(text) else None)
@@ -84,7 +86,7 @@ class Pmx(Codec):
                 continue
             if request.gather:
                 return Decoded(Reply((*strays, text), acknowledged=True), at)
-            wrong = len(text) > LONGEST or any(not " " <= c <= "~" for c in text)
+            wrong = len(text) > LONGEST_COMMAND or any(not " " <= c <= "~" for c in text)
             if wrong or (MARKED.search(text) and text != f"?{request.text}"):
                 reply = Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
             elif text.startswith("?"):
@@ -137,7 +139,7 @@ class Pmx(Codec):
         names = self._names(addresses) or [FACTORY]
         pieces = [(name, "ABORT") for name in (*names[1:], names[0])]
         pieces += [(name, text) for name in names for text in ("SR0=0", "SR1=0", "ABORT")]
-        return [StopPiece(self._command(name, text), GAP) for name, text in pieces]
+        return [StopPiece(self._command(name, text), STOP_PIECE_QUIET) for name, text in pieces]
 
     def _names(self, addresses: Sequence[str]) -> list[str]:
         return [name for name in addresses if name] if self.addressed else [""]
@@ -160,9 +162,9 @@ class Pmx(Codec):
     def stop_started(self, address: str, started: Started) -> Sequence[StopPiece]:
         """Return ABORT for each axis that was started; with a program the usual stop."""
         if started.program:
-            return (StopPiece(self.stop([address]), GAP), *self.stop_again([address])[1:])
+            return (StopPiece(self.stop([address]), STOP_PIECE_QUIET), *self.stop_again([address])[1:])
         axes = [axis for axis in AXES if started.axes is None or axis.lower() in started.axes]
-        return tuple(StopPiece(self._command(address, f"ABORT{axis}"), GAP) for axis in axes)
+        return tuple(StopPiece(self._command(address, f"ABORT{axis}"), STOP_PIECE_QUIET) for axis in axes)
 
     def invalidate(self) -> bytes:
         """Return the end of a command that no unit knows; should a unit read it otherwise, ABORT follows at once."""

@@ -30,9 +30,9 @@ from multidrop.dialects.values import Values
 from multidrop.families.pmx.host.codec import FACTORY, STOP_BYTES, Pmx, PmxState
 from multidrop.families.pmx.host.operations import SEARCH, PmxCertifying, PmxOperations, find
 from multidrop.families.pmx.manual import help
-from multidrop.families.pmx.manual.table import COMMANDS, Motion, head, lookup, reads, starts_motion
+from multidrop.families.pmx.manual.table import COMMANDS, PmxMotion, head, lookup, reads, starts_motion
 
-FIRST = "X"
+FIRST_AXIS = "X"
 """The first axis."""
 
 
@@ -78,19 +78,19 @@ class PmxFamily(PmxOperations, Family):
         if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
             raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
         named = tuple(name for name in hints.tried if re.fullmatch(r"\d\d", name, re.ASCII))
-        found: list[DriveState] = []
+        states: list[DriveState] = []
         for name in hints.drives or named or (FACTORY,):
             state = PmxState(Pmx(), name)
             if (yield from find(state)) is None:
                 state.note(f"{who(state)} does not reply")
-            found.append(state)
-        if any(state.product for state in found):
-            return found
+            states.append(state)
+        if any(state.product for state in states):
+            return states
         if not hints.drives:
             alone = yield from find(PmxState(Pmx(addressed=False)))
             if alone is not None:
                 return [alone]
-        tried = ", ".join(state.address for state in found)
+        tried = ", ".join(state.address for state in states)
         raise NoAnswer(f"no controller replies at {tried}; drives=00,01,... names others; {SEARCH}")
 
     def guard(self, text: str) -> Guard | None:
@@ -113,7 +113,7 @@ class PmxFamily(PmxOperations, Family):
     def only_ends(cls, text: str) -> bool:
         """Whether a command of motion can only end it: that ends a program (SR)."""
         row = COMMANDS.get(cls.word_of(text.strip()))
-        return row is not None and row.motion is Motion.PROGRAM and text.partition("=")[2].strip() in row.quiet
+        return row is not None and row.motion is PmxMotion.PROGRAM and text.partition("=")[2].strip() in row.quiet
 
     @classmethod
     def only_reads(cls, text: str) -> bool:
@@ -125,11 +125,11 @@ class PmxFamily(PmxOperations, Family):
 
     @classmethod
     def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        return "INC", f"{axis.upper() or FIRST}{distance}"
+        return "INC", f"{axis.upper() or FIRST_AXIS}{distance}"
 
     @classmethod
     def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
-        return "ABS", f"{axis.upper() or FIRST}{position}"
+        return "ABS", f"{axis.upper() or FIRST_AXIS}{position}"
 
     @classmethod
     def assign(cls, word: str, value: str) -> str | None:
@@ -178,6 +178,6 @@ class PmxFamily(PmxOperations, Family):
     @classmethod
     def addressed(cls, text: str, product: str) -> tuple[str, str] | None:
         """Split a line into a device number and a command (`01PX`, as on the wire, with its @ or without)."""
-        found = _ADDRESSED.match(text)
-        rest = text[found.end() :] if found is not None else ""
-        return (found[1], rest) if found is not None and lookup(rest.upper()) is not None else None
+        match = _ADDRESSED.match(text)
+        rest = text[match.end() :] if match is not None else ""
+        return (match[1], rest) if match is not None and lookup(rest.upper()) is not None else None

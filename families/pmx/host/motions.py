@@ -60,26 +60,26 @@ RUNNING, FAILED_PROGRAM = 1, 4
 
 
 def _effect(line: str) -> Effect:
-    if (found := PLACE.fullmatch(line)) is not None:
-        targets = zip("xyxy", found.groups(), strict=True)
+    if (match := PLACE.fullmatch(line)) is not None:
+        targets = zip("xyxy", match.groups(), strict=True)
         moves = {axis: int(value) for axis, value in targets if value is not None}
         group = frozenset(moves if len(moves) > 1 else ())  # an interpolated move: a stop of one axis stops both (7.7)
         return Effect(
             begins=tuple(Move(MoveKind.POSITION, axis, relative=by, group=group) for axis, by in moves.items())
         )
-    if (found := FLYING.fullmatch(line)) is not None:
-        return Effect(begins=(Move(MoveKind.POSITION, found[1].lower(), target=int(found[2])),))
-    if (found := JOG.fullmatch(line)) is not None:
-        return Effect(begins=_without_target(_axes(found[1]), endless=True))
-    if (found := HOMING.fullmatch(line)) is not None:
-        target = None if found[1] == OVERSHOOTS else 0
-        return Effect(begins=(Move(MoveKind.HOMING, found[2].lower(), target),))
-    if (found := STOP.fullmatch(line)) is not None:
-        return Effect(ends=_axes(found[1]))
+    if (match := FLYING.fullmatch(line)) is not None:
+        return Effect(begins=(Move(MoveKind.POSITION, match[1].lower(), target=int(match[2])),))
+    if (match := JOG.fullmatch(line)) is not None:
+        return Effect(begins=_without_target(_axes(match[1]), endless=True))
+    if (match := HOMING.fullmatch(line)) is not None:
+        target = None if match[1] == OVERSHOOTS else 0
+        return Effect(begins=(Move(MoveKind.HOMING, match[2].lower(), target),))
+    if (match := STOP.fullmatch(line)) is not None:
+        return Effect(ends=_axes(match[1]))
     if STARTS.fullmatch(line):
         return Effect(begins=tuple(Move(MoveKind.PROGRAM, axis) for axis in sorted(BOTH)))
-    if (found := REFERS.fullmatch(line)) is not None:
-        return Effect(unknown=_axes(found[1]))
+    if (match := REFERS.fullmatch(line)) is not None:
+        return Effect(unknown=_axes(match[1]))
     if CLEARS.fullmatch(line):
         return Effect(clears=True)
     if JOYSTICK.fullmatch(line):
@@ -138,24 +138,24 @@ class PmxMotions(Motions):
     def effect(self, text: str) -> Effect:
         """What a typed command does to the motions. Raises Inexpressible for what no frame can carry."""
         state = self.state
-        found = _effect(text.strip())
-        if found.begins and state.address not in ADDRESSES:
+        effect = _effect(text.strip())
+        if effect.begins and state.address not in ADDRESSES:
             state.codec.encode(state.codec.request(state.address, text))  # before anything is asked for it
-        return found
+        return effect
 
     def signs(self) -> Procedure[Signs]:
         """Read what shows a failure, and where distances count from: MM=0 makes every target a position."""
         state = self.state
-        found: dict[str, int] = {}
+        signs: dict[str, int] = {}
         for word in ("MM", "EO", LOST):
-            found[word] = yield from number(state, word)
+            signs[word] = yield from number(state, word)
         for axis in table.AXES:
-            words = ("MST", "SLS", "P") if found["MM"] == DISTANCES else ("MST", "SLS")
+            words = ("MST", "SLS", "P") if signs["MM"] == DISTANCES else ("MST", "SLS")
             for word in words:
-                found[f"{word}{axis}"] = yield from number(state, f"{word}{axis}")
+                signs[f"{word}{axis}"] = yield from number(state, f"{word}{axis}")
         for program in PROGRAMS:
-            found[f"SASTAT{program}"] = yield from number(state, f"SASTAT{program}")
-        return found
+            signs[f"SASTAT{program}"] = yield from number(state, f"SASTAT{program}")
+        return signs
 
     def old(self, signs: Signs, own: bool) -> Procedure[Signs]:
         """Report latched errors to who waits for another's motion; before an own one the move is refused."""

@@ -86,8 +86,8 @@ class PmxExchange(Exchange):
         """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
         received, text = reply.text, request.text
         head = f"{self._who} refused '{text}'"
-        if (found := table.meaning(received)) is not None:
-            return Refused(f"{head}: {received}: {found[0]} ({_valid(text, received) or found[1]})")
+        if (meaning := table.meaning(received)) is not None:
+            return Refused(f"{head}: {received}: {meaning[0]} ({_valid(text, received) or meaning[1]})")
         if received != f"?{text}" and not text.startswith(received[1:]):
             return NoAnswer(
                 f"{self._who}: {received!r} came for '{text}': the line was disturbed, or another program uses it; "
@@ -98,7 +98,7 @@ class PmxExchange(Exchange):
         moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
         if moves:
             advice = "an axis with a limit error takes no move: /status shows it, CLRX and CLRY clear it"
-            if beyond := [each for each in re.findall(r"-?\d+", text) if not -INT32 <= int(each) < INT32]:
+            if beyond := [number for number in re.findall(r"-?\d+", text) if not -INT32 <= int(number) < INT32]:
                 advice = f"{beyond[0]} is beyond the range, {-INT32} to {INT32 - 1}"
         what = "it does not take that now" if moves else "it does not know that command"
         return Refused(f"{head}: {received}: {what}" + (f" ({advice})" if advice else ""))
@@ -139,17 +139,17 @@ class PmxOperations(OfDrive):
         """Read position, speed and status of each axis; a poll skips the speed of an axis that rests."""
         known = self.state
         doubts: list[Request] = []
-        found = []
+        motions = []
         for axis in table.AXES:
             position = yield from number(known, f"P{axis}", priority, doubts)
             state = yield from number(known, f"MST{axis}", priority, doubts)
             speed = 0
             if state & table.MOVING or priority is not Priority.POLL:
                 speed = yield from number(known, f"PS{axis}", priority, doubts)
-            found.append(Motion(position, speed, axis.lower(), table.trouble_words(state)))
+            motions.append(Motion(position, speed, axis.lower(), table.trouble_words(state)))
         if doubts:
             yield from PmxExchange(known).beyond_doubt(doubts[0])
-        return tuple(found)
+        return tuple(motions)
 
     def moving(self) -> Procedure[bool]:
         for axis in table.AXES:
@@ -165,10 +165,10 @@ class PmxOperations(OfDrive):
 
     def referencing(self, text: str) -> Referencing | None:
         """Find out whether a command homes an axis or sets its position. (7.10.)"""
-        if found := HOMING.fullmatch(text.strip()):
-            return Referencing(found[1].lower(), homing=True)
-        found = SETS.match(text.strip())
-        return Referencing(found[1].lower(), homing=False) if found else None
+        if match := HOMING.fullmatch(text.strip()):
+            return Referencing(match[1].lower(), homing=True)
+        match = SETS.match(text.strip())
+        return Referencing(match[1].lower(), homing=False) if match else None
 
     def homed(self) -> Procedure[bool]:
         return not any(axis.trouble for axis in (yield from self.motion(Priority.OPERATOR)))
@@ -209,14 +209,14 @@ def troubles(known: PmxState) -> Procedure[None]:
 PRODUCT = re.compile(r"(?i)performax-(\S+)")
 NAME = re.compile(r"\d[A-Za-z]+(\d\d)")
 SEARCH = "multidrop scan PORT --dialect pmx tries every number and baud rate"
-TRIES = 2
+SYNC_TRIES = 2
 """The first question may follow the rest of another line."""
 
 
 def find(state: PmxState) -> Procedure[PmxState | None]:
     """Identify one controller; None where it is silent."""
     text = ""
-    for tried in range(TRIES):
+    for tried in range(SYNC_TRIES):
         # A gateway's greeting came in its place: the controller's reply is late.
         late = tried and not text.startswith("?")
         if late and (yield from PmxExchange(state).mark(state.codec.request(state.address, "ID"), False)) is None:

@@ -28,7 +28,7 @@ from multidrop.families.pmx.host.operations import (
 )
 from multidrop.families.pmx.manual import program_file, script_checker
 from multidrop.families.pmx.manual.program_file import RAW, Undecodable
-from multidrop.families.pmx.manual.script_compiler import EMPTY, ERASED, LINES
+from multidrop.families.pmx.manual.script_compiler import EMPTY, ERASED, MEMORY_LINES
 from multidrop.families.pmx.manual.script_parser import VARIABLES
 from multidrop.families.pmx.manual.table import PROBE, PROBED, lookup
 
@@ -65,7 +65,7 @@ def _simulator_only(state: PmxState) -> Procedure[None]:
 def _erase_behind(state: PmxState, at: int) -> Procedure[None]:
     """Erase the rest of a longer program after this one."""
     blank = 0
-    while at < LINES and blank < BLANK:
+    while at < MEMORY_LINES and blank < BLANK:
         if (yield from read_line(state, at)) in EMPTY:
             blank += 1
         else:
@@ -99,15 +99,15 @@ class PmxPrograms(Programs):
 
     def listing(self, place: str = "") -> Printed:
         """List `SAn=TOKEN` for every stored line, from a number on."""
-        found: list[str] = []
+        lines: list[str] = []
         blank = 0
-        for at in range(whole(place, 0, LINES) or 0, LINES):
+        for at in range(whole(place, 0, MEMORY_LINES) or 0, MEMORY_LINES):
             token = yield from read_line(self.state, at)
             blank = blank + 1 if token in EMPTY else 0
-            found.append(f"SA{at}={token}")
+            lines.append(f"SA{at}={token}")
             if blank == BLANK:
                 break
-        return tuple(found[: len(found) - blank])
+        return tuple(lines[: len(lines) - blank])
 
     def readable(self, held: Held) -> Sequence[str]:
         """Return the program as A-SCRIPT, or as compiled lines with a remark where a unit's own compiler made them."""
@@ -121,19 +121,19 @@ class PmxPrograms(Programs):
         """Read the stored lines, at least as far as these lines of a file go; then the variables, for a backup."""
         last = max((at for _, at, _ in program_file.compiled(lines)), default=-1) if lines else -1
         more = VARIABLES if lines else 0
-        found: list[Stored] = []
+        stored: list[Stored] = []
         blank = at = 0
-        while at < LINES and (blank < BLANK or at <= last):
+        while at < MEMORY_LINES and (blank < BLANK or at <= last):
             progress(at, max(at + BLANK - blank, last + 1) + more)
             token = yield from read_line(self.state, at)
             blank = blank + 1 if token in EMPTY else 0
-            found += [] if token in EMPTY else [Stored(at, token)]
+            stored += [] if token in EMPTY else [Stored(at, token)]
             at += 1
         names = []
         for variable in range(more):
             progress(at + variable, at + more)
             names.append(f"V{variable} = {(yield from number(self.state, f'V{variable}'))}")
-        return Held(tuple(found), tuple(names))
+        return Held(tuple(stored), tuple(names))
 
     def file(self, held: Held, raw: bool) -> Sequence[str]:
         return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else self.readable(held)
@@ -198,14 +198,14 @@ class PmxPrograms(Programs):
         """Compare the compiled lines of a file with the stored ones; a script is all that the controller holds."""
         there = dict(held.lines)
         stored = program_file.compiled(lines)
-        found = [
+        differences = [
             Difference(source, f"SA{at}={token}", at, f"SA{at}={there.get(at, '')}")
             for source, at, token in stored
             if there.get(at, "") != token and not (token in EMPTY and at not in there)
         ]
         if not program_file.is_raw(lines):
-            found += [Difference(0, "", at, f"SA{at}={token}") for at, token in held.lines if at >= len(stored)]
-        return tuple(found)
+            differences += [Difference(0, "", at, f"SA{at}={token}") for at, token in held.lines if at >= len(stored)]
+        return tuple(differences)
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         marks = {token for _, _, token in program_file.compiled(lines) if token.startswith("PS")} or {"PS0"}
@@ -261,7 +261,7 @@ class PmxDebugging(Debugging):
     def listing(self) -> Procedure[tuple[Stored, ...]]:
         """Read the compiled lines; where they can be decompiled, the statements at their first lines."""
         lines = yield from PmxPrograms(self.state).listing()
-        return _rows(tuple(Stored(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
+        return _rows(tuple(Stored(int(match[1]), match[2]) for line in lines if (match := RAW.fullmatch(line))))
 
     def rows(self, held: Held) -> Sequence[Stored]:
         return _rows(held.lines)
@@ -310,8 +310,8 @@ class PmxDebugging(Debugging):
                 )
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-        found = {}
+        values = {}
         for name in names:
             reply = yield from PmxExchange(self.state).answered(self.state.codec.request(self.state.address, name))
-            found[name] = reply.text
-        return found
+            values[name] = reply.text
+        return values

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from multidrop.dialects.codec import Kind, Procedure
-from multidrop.dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
+from multidrop.dialects.scanning import WINDOW, Found, Reach, Scan, SearchOutcome, Step
 from multidrop.families.pmx.host.codec import FACTORY, Pmx, PmxState
 from multidrop.families.pmx.host.operations import find
 
@@ -17,11 +17,11 @@ NUMBERS = tuple(f"{number:02}" for number in range(100))
 NOTHING = "~~~"
 """A word that no controller knows."""
 NO_REPLY = b"\r\n\0"
-LATE = 4
+LATE_ADDRESSES = 4
 """Numbers before the present one whose reply may come now."""
 CERTAIN = 5
 """Windows in which a late reply comes."""
-SHOWN = 3
+MOST_SHOWN_REMARKS = 3
 """Replies that could not be read, until the rest is only counted."""
 BUSY = 2.5
 """The longest wait, in windows, where something else arrives."""
@@ -64,7 +64,7 @@ class PmxScan(Scan):
     def places(self, reach: Reach) -> int:
         return len(_numbers(reach))
 
-    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[SearchOutcome]:
         """Search for every controller at one baud rate; report each as soon as it is identified."""
         remarks: list[str] = []
         seen = set(reach.known)
@@ -73,15 +73,19 @@ class PmxScan(Scan):
             if state.address not in seen and not (seen and not state.address):
                 heard = yield from _replies(state, reach.window)
                 if heard.strip(NO_REPLY) and not (
-                    yield from _identified(states[max(0, at - LATE) : at + 1], seen, found)
+                    yield from _identified(states[max(0, at - LATE_ADDRESSES) : at + 1], seen, found)
                 ):
                     remarks.append(
                         f"{heard[:40]!r} was received at {state.address or 'no number'}: no controller's reply"
                     )
             step()
         yield from _identified([state for state in states if state.address == NUMBERS[-1]], seen, found)
-        more = [f"at {len(remarks) - SHOWN} more numbers something was received"] if len(remarks) > SHOWN else []
-        return Outcome((*remarks[:SHOWN], *more))
+        more = (
+            [f"at {len(remarks) - MOST_SHOWN_REMARKS} more numbers something was received"]
+            if len(remarks) > MOST_SHOWN_REMARKS
+            else []
+        )
+        return SearchOutcome((*remarks[:MOST_SHOWN_REMARKS], *more))
 
     def clear(self) -> Procedure[None]:
         """End a half-sent command, whose number no controller has."""

@@ -35,12 +35,12 @@ class PmxUnits(Units):
         return [axis.lower() for axis in AXES]
 
     def fields(self, text: str) -> Sequence[Field]:
-        if (found := _SET.fullmatch(text)) is not None:
-            takes = Takes.PLACE if found[1] == "P" else Takes.SPEED
-            return (Field(found[2].lower(), takes, *found.span(3)),)
-        found = _MOVE.fullmatch(text)
-        groups = zip((1, 2, 3, 4), "xyxy", strict=True) if found is not None else ()
-        return [Field(axis, Takes.TARGET, *found.span(n), True) for n, axis in groups if found is not None and found[n]]
+        if (match := _SET.fullmatch(text)) is not None:
+            takes = Takes.PLACE if match[1] == "P" else Takes.SPEED
+            return (Field(match[2].lower(), takes, *match.span(3)),)
+        match = _MOVE.fullmatch(text)
+        groups = zip((1, 2, 3, 4), "xyxy", strict=True) if match is not None else ()
+        return [Field(axis, Takes.TARGET, *match.span(n), True) for n, axis in groups if match is not None and match[n]]
 
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
         names = [f"{word}{axis.upper()}" for word in reversed(SCALES)]  # StepNLoop first
@@ -50,15 +50,15 @@ class PmxUnits(Units):
         return Basis(tuple(settings), missing="the controller does not report the steps of a turn")
 
     def disturbs(self, text: str) -> Collection[str]:
-        found = _DISTURBS.match(text)
-        return (found[1].lower(),) if found is not None else ()
+        match = _DISTURBS.match(text)
+        return (match[1].lower(),) if match is not None else ()
 
     def recounts(self, request: Request) -> bool:
         return _RECOUNTS.match(request.text) is not None
 
     def reads(self, text: str) -> tuple[str, Takes] | None:
-        found = _READ.fullmatch(text)
-        return (found[2].lower(), Takes.PLACE if found[1] == "P" else Takes.SPEED) if found is not None else None
+        match = _READ.fullmatch(text)
+        return (match[2].lower(), Takes.PLACE if match[1] == "P" else Takes.SPEED) if match is not None else None
 
     def target(self) -> Procedure[Takes]:
         return Takes.DISTANCE if (yield from number(self.state, "MM")) else Takes.PLACE

@@ -51,7 +51,7 @@ from multidrop.families.pmx.host.operations import (
 from multidrop.families.pmx.host.programs import PmxPrograms
 from multidrop.families.pmx.manual import table
 from multidrop.families.pmx.manual.program_file import RAW
-from multidrop.families.pmx.manual.table import Corrects, Kept
+from multidrop.families.pmx.manual.table import Corrects, PmxRetention
 
 UNREAD = (("JO", "the controller does not report whether the joystick is on"),)
 RATIO = "SLR"
@@ -61,13 +61,13 @@ _AXIS = re.compile(rf"([A-Z]+?)([{''.join(table.AXES)}])\Z")
 def base(name: str) -> str:
     if name in table.COMMANDS:
         return name
-    found = _AXIS.match(name)
-    return found[1] if found is not None and found[1] in table.COMMANDS else name.rstrip("0123456789")
+    match = _AXIS.match(name)
+    return match[1] if match is not None and match[1] in table.COMMANDS else name.rstrip("0123456789")
 
 
 def axis(name: str) -> str:
-    found = _AXIS.match(name)
-    return found[2] if found is not None and name not in table.COMMANDS and found[1] in table.COMMANDS else ""
+    match = _AXIS.match(name)
+    return match[2] if match is not None and name not in table.COMMANDS and match[1] in table.COMMANDS else ""
 
 
 def reading(name: str, value: Value) -> Reading:
@@ -77,13 +77,16 @@ def reading(name: str, value: Value) -> Reading:
     return Reading(name, value, unit=table.COMMANDS[word].unit, fixed=name in table.WIRE)
 
 
-def _turn(row: table.Command) -> tuple[bool, bool]:
+def _turn(row: table.PmxCommand) -> tuple[bool, bool]:
     """Speeds first, and last what switches StepNLoop on or lets it correct."""
     return row.unit != "pulses/s", row.corrects in (Corrects.LOOP, Corrects.WHILE_ON)
 
 
 NAMES = tuple(
-    word for row in sorted(table.ROWS, key=_turn) if row.kept in (Kept.SETTING, Kept.WIRE) for word in row.words()
+    word
+    for row in sorted(table.ROWS, key=_turn)
+    if row.kept in (PmxRetention.SETTING, PmxRetention.WIRE)
+    for word in row.words()
 )
 """The settings in the order in which they are written."""
 
@@ -201,18 +204,18 @@ POLARITY = 1 << 10
 
 def _facts(state: PmxState, names: Sequence[str]) -> Procedure[dict[str, Value]]:
     doubts: list[Request] = []
-    found: dict[str, Value] = {}
+    facts: dict[str, Value] = {}
     for name in names:
-        found[name] = yield from number(state, name, Priority.POLL, doubts)
+        facts[name] = yield from number(state, name, Priority.POLL, doubts)
     if doubts:
         yield from PmxExchange(state).beyond_doubt(doubts[0])
-    return found
+    return facts
 
 
 def _programs(state: PmxState) -> Procedure[Facts]:
-    found = yield from _facts(state, [f"SASTAT{program}" for program in PROGRAMS])
-    active = [f"SPC{program}" for program in PROGRAMS if found[f"SASTAT{program}"] in (RUNNING, PAUSED)]
-    return found | (yield from _facts(state, active))
+    facts = yield from _facts(state, [f"SASTAT{program}" for program in PROGRAMS])
+    active = [f"SPC{program}" for program in PROGRAMS if facts[f"SASTAT{program}"] in (RUNNING, PAUSED)]
+    return facts | (yield from _facts(state, active))
 
 
 def clearing(axis: str) -> str:
@@ -235,7 +238,7 @@ def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
         code, text = loop, f"StepNLoop {table.loop_words(loop)}"
     return Conditions(
         axis=axis.lower(),
-        lamps=tuple(Lamp("", each, None if status is None else bool(status & bit)) for bit, each in ON_AXIS),
+        lamps=tuple(Lamp("", name, None if status is None else bool(status & bit)) for bit, name in ON_AXIS),
         error=code,
         error_text=text,
         clears=clearing(axis) if code else "",
@@ -333,21 +336,21 @@ class PmxValues(Values):
         )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
-        found = []
+        parts = []
         for axis in table.AXES:
             loop = (f"SLS{axis}", f"DX{axis}") if facts.get(f"SL{axis}") else ()
-            found.append(Part(axis, partial(_facts, self.state, names=(f"MST{axis}", *loop))))
-        found += [
+            parts.append(Part(axis, partial(_facts, self.state, names=(f"MST{axis}", *loop))))
+        parts += [
             Part("points", partial(_facts, self.state, names=("DI", "DO", "EO"))),
             Part("programs", partial(_programs, self.state)),
         ]
-        found += [
+        parts += [
             Part(f"settings {axis}", partial(_facts, self.state, names=(f"SL{axis}",)), slow=True)
             for axis in table.AXES
         ]
-        named = [each + axis for axis in ("", *table.AXES) for each in SPEEDS]
+        named = [speed + axis for axis in ("", *table.AXES) for speed in SPEEDS]
         return [
-            *found,
+            *parts,
             *(Part(name, partial(_facts, self.state, names=(name,)), slow=True) for name in (*named, "EDEC")),
         ]
 

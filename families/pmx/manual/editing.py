@@ -13,7 +13,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.base.files import split_lines
 from multidrop.dialects.editing import Block, EditingLanguage, Offer, Span, Use, UserName, Word, collected
 from multidrop.families.pmx.manual import script_parser
-from multidrop.families.pmx.manual.script_parser import Statement, Value, parse
+from multidrop.families.pmx.manual.script_parser import ScriptStatement, ScriptValue, parse
 
 _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
 _SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
@@ -48,8 +48,8 @@ class PmxEditing(EditingLanguage):
                         word, kind, Span(number, start, stop), first if kind == "variable" else "GOSUB" not in code
                     )
 
-        found = collected(uses(), lambda at: self.remark(lines[at]))
-        return [each._replace(declared=each.declared[:1]) for each in found]
+        collected_names = collected(uses(), lambda at: self.remark(lines[at]))
+        return [name._replace(declared=name.declared[:1]) for name in collected_names]
 
     def fixed(self, name: UserName) -> str:
         if name.kind == "program":
@@ -64,31 +64,31 @@ class PmxEditing(EditingLanguage):
         return word, word.removeprefix("SUB ")
 
     def changed(self, text: str, renamed: Sequence[str], name: UserName, word: str) -> str:
-        wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
+        wanted = [_renamed(statement, name.word, word) for statement in parse(text)[0]]
         pairs = zip(wanted, parse("\n".join(renamed))[0], strict=True)
         return next((f"line {other.line}" for one, other in pairs if one != other), "")
 
     def words(self, line: str, names: Container[str]) -> list[Word]:
         """Return the words of a line; each axis of a move is one."""
-        found = []
+        words = []
         for word in script_parser.words(line):
             if script_parser.MOVE_WORD.fullmatch(word.text):
-                found += [
+                words += [
                     Word(word.start + at, word.start + at + 1, axis)
                     for at, axis in enumerate(word.text)
                     if axis in script_parser.AXES
                 ]
             else:
-                found.append(word)
-        return found
+                words.append(word)
+        return words
 
     def describe(self, word: str, product: str) -> list[str]:
         return script_parser.describe(word)
 
     def last_word(self, before: str) -> str:
         """Return the word at the end of a begun line that may be completed: the number after GOSUB, too."""
-        found = _CALL.match(before)
-        return found[1] if found else super().last_word(before)
+        match = _CALL.match(before)
+        return match[1] if match else super().last_word(before)
 
     def offered(self, begun: str, word: str, names: Iterable[UserName], product: str) -> Iterator[Offer]:
         """Yield subroutines after GOSUB, what can be read in values, and all else at the head of a line."""
@@ -96,11 +96,11 @@ class PmxEditing(EditingLanguage):
         if _NEW.match(before):
             return
         if _CALL.match(before):
-            known = (each for each in names if each.kind == "subroutine" and each.declared)
-            yield from (each.offer._replace(text=each.word.removeprefix("SUB ")) for each in known)
+            known = (name for name in names if name.kind == "subroutine" and name.declared)
+            yield from (name.offer._replace(text=name.word.removeprefix("SUB ")) for name in known)
             return
         first = not begun.strip()
-        yield from (each.offer for each in names if each.kind == "variable")
+        yield from (name.offer for name in names if name.kind == "variable")
         for text, register in script_parser.offered():
             if _fits(register, first):
                 kind = "starts" if script_parser.kind_of(text, first) == "starts" else "word"
@@ -120,20 +120,20 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
         return
     indent = len(code) - len(code.lstrip())
     if script_parser.MOVE.fullmatch(code.strip()):
-        found = [(each[2], indent + each.start(2)) for each in script_parser.TARGET.finditer(code.strip())]
+        targets = [(match[2], indent + match.start(2)) for match in script_parser.TARGET.finditer(code.strip())]
     else:
-        found = [(word.text, word.start) for word in script_parser.words(code)]
+        targets = [(word.text, word.start) for word in script_parser.words(code)]
     yield from (
-        (text, "variable", start, start + len(text)) for text, start in found if text in script_parser.VARIABLE_NAMES
+        (text, "variable", start, start + len(text)) for text, start in targets if text in script_parser.VARIABLE_NAMES
     )
 
 
-def _renamed(statement: Statement, old: str, new: str) -> Statement:
+def _renamed(statement: ScriptStatement, old: str, new: str) -> ScriptStatement:
     """Return a statement with another variable, or another number of a subroutine."""
     if old.startswith("SUB "):
-        numbered = statement.word in ("SUB", "GOSUB") and statement.values == (Value(old[4:]),)
-        return replace(statement, values=(Value(new[4:]),)) if numbered else statement
-    values = tuple(Value(new) if each.text == old else each for each in statement.values)
+        numbered = statement.word in ("SUB", "GOSUB") and statement.values == (ScriptValue(old[4:]),)
+        return replace(statement, values=(ScriptValue(new[4:]),)) if numbered else statement
+    values = tuple(ScriptValue(new) if value.text == old else value for value in statement.values)
     return replace(statement, values=values, word=new if statement.word == old else statement.word)
 
 
@@ -151,17 +151,17 @@ def _variable(name: UserName, new: str) -> str:
 
 
 def _subroutine(new: str) -> str:
-    found = _NUMBER.fullmatch(new.strip())
-    if found is None or int(found[1]) >= script_parser.SUBROUTINES:
+    match = _NUMBER.fullmatch(new.strip())
+    if match is None or int(match[1]) >= script_parser.SUBROUTINES:
         raise Diagnostic(f"{new!r} is not a subroutine", "", f"subroutines are 0 to {script_parser.SUBROUTINES - 1}")
-    if int(found[1]) == script_parser.HANDLER:
+    if int(match[1]) == script_parser.HANDLER:
         raise Diagnostic(
             f"SUB {script_parser.HANDLER} is the subroutine that runs after an error", "", "choose another number"
         )
-    return f"SUB {int(found[1])}"
+    return f"SUB {int(match[1])}"
 
 
-def _fits(register: script_parser.Register | None, first: bool) -> bool:
+def _fits(register: script_parser.ScriptRegister | None, first: bool) -> bool:
     """Whether a word may begin a line (`first`), or be a value; None: a word of programs alone."""
     if register is None:
         return first
@@ -174,7 +174,7 @@ class _Outline:
     def __init__(self, text: str) -> None:
         self.lines = split_lines(text)
         self.blocks: list[Block] = []
-        self.open: list[tuple[Statement, list[Block]]] = []
+        self.open: list[tuple[ScriptStatement, list[Block]]] = []
         for number, statement in enumerate(parse(text)[0]):
             at = statement.line - 1
             if statement.word in ("PRG", "SUB"):
@@ -184,14 +184,14 @@ class _Outline:
             if statement.word in _KINDS:
                 self.open.append((statement, []))
             elif not number:
-                self.open.append((Statement("block", "PRG", (), "", statement.line, statement.column), []))
+                self.open.append((ScriptStatement("block", "PRG", (), "", statement.line, statement.column), []))
             if statement.word in _ENDS:
                 self.close(_ENDS[statement.word], at)
         self.close("", len(self.lines) - 1)
 
     def close(self, word: str, last: int) -> None:
         """End the innermost block of that word and those in it; without a word, all. One without a begin is left."""
-        if word and word not in (each.word for each, _ in self.open):
+        if word and word not in (statement.word for statement, _ in self.open):
             return
         while self.open:
             begin, parts = self.open.pop()
@@ -199,7 +199,7 @@ class _Outline:
             if begin.word == word:
                 return
 
-    def block(self, begin: Statement, last: int, parts: Sequence[Block]) -> Block:
+    def block(self, begin: ScriptStatement, last: int, parts: Sequence[Block]) -> Block:
         code, _, remark = self.lines[begin.line - 1].partition(";")
         name = str(begin) if begin.values else "PRG 0"
         place = Span(begin.line - 1, begin.column - 1, max(len(code.rstrip()), begin.column - 1))

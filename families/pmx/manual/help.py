@@ -14,7 +14,7 @@ from multidrop.families.pmx.manual.table import (
     ELSEWHERE,
     ROWS,
     WORDS,
-    Command,
+    PmxCommand,
     head,
     lookup,
     meaning,
@@ -84,7 +84,7 @@ class PmxLanguage(Language):
 LANGUAGE = PmxLanguage()
 
 
-def syntax(row: Command) -> str:
+def syntax(row: PmxCommand) -> str:
     forms = list(EXAMPLES.get(row.name, ()))
     for shape in () if forms else row.shapes:
         words = list(replace(row, shape=shape).words())

@@ -22,7 +22,7 @@ from multidrop.dialects.program_files import (
     respelled,
 )
 from multidrop.families.pmx.manual import script_checker, script_compiler, script_parser
-from multidrop.families.pmx.manual.script_compiler import EMPTY, ERASED, LINES
+from multidrop.families.pmx.manual.script_compiler import EMPTY, ERASED, MEMORY_LINES
 from multidrop.families.pmx.manual.script_parser import AXES, WORDS, parse
 
 _OPERATIONS = {code: op for op, code in script_compiler.OPERATION.items()}
@@ -45,7 +45,7 @@ def decompile(lines: Sequence[str]) -> list[str]:
     end = len(lines)
     while end and lines[end - 1] in EMPTY:
         end -= 1
-    text = _Reader(lines[:end]).program()
+    text = _ProgramReader(lines[:end]).program()
     if text:
         code = script_compiler.compile_(parse("\n".join(text))[0])
         for at, token in enumerate(lines[:end]):
@@ -57,7 +57,7 @@ def decompile(lines: Sequence[str]) -> list[str]:
     return text
 
 
-class _Reader:
+class _ProgramReader:
     def __init__(self, lines: Sequence[str]) -> None:
         self.lines = lines
         self.stack: list[str] = []
@@ -79,10 +79,10 @@ class _Reader:
 
     def one(self, at: int) -> int:
         """Decompile the line `at`; return the next one."""
-        found = script_compiler.split(self.lines[at])
-        if found is None:
+        compiled = script_compiler.split(self.lines[at])
+        if compiled is None:
             raise Undecodable(at, self.lines[at])
-        word, argument = found
+        word, argument = compiled
         if word in ("CV", "VR"):
             self.stack.append(argument if word == "CV" else f"V{argument}")
         elif word in ("JI", "JW"):
@@ -147,10 +147,10 @@ class _Reader:
             raise Undecodable(at, self.lines[at])
 
     def jump(self, at: int, word: str) -> int:
-        found = script_compiler.split(self.lines[at]) if at < len(self.lines) else None
-        if found is None or found[0] != word or not at < at + int(found[1]) < len(self.lines):
+        compiled = script_compiler.split(self.lines[at]) if at < len(self.lines) else None
+        if compiled is None or compiled[0] != word or not at < at + int(compiled[1]) < len(self.lines):
             raise Undecodable(at, self.lines[at] if at < len(self.lines) else "")
-        return at + int(found[1])
+        return at + int(compiled[1])
 
     def end_of_if(self, at: int) -> int:
         """Find the EI0 of the IF whose JR is line `at`, by that JR or by the JO before its target."""
@@ -215,7 +215,7 @@ def canonical(text: str) -> str:
     return str(statements[0])
 
 
-LONGEST = 40
+LONGEST_COMPILED_LINE = 40
 """Characters of a compiled line, far more than the ten seen from units."""
 RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)
 parts = script_parser.parts
@@ -229,7 +229,7 @@ def read(text: str, name: str) -> list[SourceLine]:
 
 def measure(text: str) -> str:
     """Describe the share of the controller's memory that a program takes. Raises Diagnostic."""
-    return f"{len(compiled(read(text, 'program')))} of {LINES} compiled lines"
+    return f"{len(compiled(read(text, 'program')))} of {MEMORY_LINES} compiled lines"
 
 
 def formatted(text: str) -> str:
@@ -246,8 +246,8 @@ def check(text: str, product: str = "") -> list[Problem]:
     problems = _check_raw(lines) if is_raw(lines) else script_checker.check(text)
     for number, line in enumerate(whole, 1):
         problems += check_comment(line, number, len(line.partition(";")[0]))
-    wrong = {each.line for each in unreadable}
-    return in_order([*unreadable, *(each for each in problems if each.line not in wrong)])
+    wrong = {problem.line for problem in unreadable}
+    return in_order([*unreadable, *(problem for problem in problems if problem.line not in wrong)])
 
 
 def is_raw(lines: Sequence[SourceLine]) -> bool:
@@ -281,7 +281,7 @@ def memory(text: str, name: str) -> list[str]:
 
 def readable(lines: Iterable[str]) -> list[str]:
     """Return A-SCRIPT for listed lines `SAn=TOKEN`. Raises Undecodable where a unit's own compiler made them."""
-    stored = {int(found[1]): found[2] for line in lines if (found := RAW.fullmatch(line.strip()))}
+    stored = {int(match[1]): match[2] for line in lines if (match := RAW.fullmatch(line.strip()))}
     return decompile(_held(stored))
 
 
@@ -297,8 +297,8 @@ def _stored(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
     """Correct compiled lines: line of the file, line in memory, content."""
     if not _placed(lines):
         return [(line.number, at, line.text) for at, line in enumerate(lines)]
-    found = [(line.number, RAW.fullmatch(line.text)) for line in lines]
-    return [(number, int(match[1]), match[2]) for number, match in found if match]
+    rows = [(line.number, RAW.fullmatch(line.text)) for line in lines]
+    return [(number, int(match[1]), match[2]) for number, match in rows if match]
 
 
 def _check_raw(lines: Sequence[SourceLine]) -> list[Problem]:
@@ -310,15 +310,17 @@ def _check_raw(lines: Sequence[SourceLine]) -> list[Problem]:
             for line in lines
             if not script_compiler.looks_compiled(line.text)
         ]
-        if len(lines) > LINES:
-            what = f"there are {len(lines)} compiled lines, and the controller holds {LINES}"
-            problems.append(Problem(lines[LINES].number, 1, what, "the memory ends at this line"))
+        if len(lines) > MEMORY_LINES:
+            what = f"there are {len(lines)} compiled lines, and the controller holds {MEMORY_LINES}"
+            problems.append(Problem(lines[MEMORY_LINES].number, 1, what, "the memory ends at this line"))
     if errors(problems):
         return problems
     stored = _stored(lines)
     for number, at, token in stored:
-        if len(token) > LONGEST or not token.isascii() or not token.isprintable():
-            what = f"a compiled line has {LONGEST} printable characters at most, and SA{at} has {len(token)}"
+        if len(token) > LONGEST_COMPILED_LINE or not token.isascii() or not token.isprintable():
+            what = (
+                f"a compiled line has {LONGEST_COMPILED_LINE} printable characters at most, and SA{at} has {len(token)}"
+            )
             problems.append(Problem(number, 1, what))
     unknown = [
         (number, token) for number, _, token in stored if token not in EMPTY and script_compiler.split(token) is None
@@ -335,13 +337,13 @@ def _check_places(lines: Sequence[SourceLine]) -> list[Problem]:
     problems: list[Problem] = []
     seen: dict[int, int] = {}
     for line in lines:
-        found = RAW.fullmatch(line.text)
-        if found is None:
+        match = RAW.fullmatch(line.text)
+        if match is None:
             problems.append(_stray(line, "a file is A-SCRIPT, or lines SA0=TOKEN and so on"))
             continue
-        at = int(found[1])
-        if at >= LINES:
-            problems.append(Problem(line.number, 3, f"no line {at}", f"lines are 0 to {LINES - 1}"))
+        at = int(match[1])
+        if at >= MEMORY_LINES:
+            problems.append(Problem(line.number, 3, f"no line {at}", f"lines are 0 to {MEMORY_LINES - 1}"))
         elif at in seen:
             problems.append(Problem(line.number, 3, f"SA{at} is already in line {seen[at]}"))
         seen.setdefault(at, line.number)
@@ -349,5 +351,5 @@ def _check_places(lines: Sequence[SourceLine]) -> list[Problem]:
 
 
 def _stray(line: SourceLine, hint: str) -> Problem:
-    text = line.text if len(line.text) <= LONGEST else f"{line.text[:LONGEST]}..."
+    text = line.text if len(line.text) <= LONGEST_COMPILED_LINE else f"{line.text[:LONGEST_COMPILED_LINE]}..."
     return Problem(line.number, 1, f"{text!r} is not a compiled line, but others are", hint)

@@ -23,11 +23,11 @@ from multidrop.families.pmx.manual.script_parser import (
     PROGRAMS,
     VARIABLES,
     WORDS,
-    Statement,
-    Value,
+    ScriptStatement,
+    ScriptValue,
 )
 
-LINES = 1275
+MEMORY_LINES = 1275
 """The size of the controller's memory, in lines (7.19.1)."""
 ERASED = "0"
 """The content of an erased line."""
@@ -51,9 +51,9 @@ _ARGUMENTS: Mapping[str, tuple[int, int]] = {
     "OX": (1, len(OPERATION)),
     "JI": (1, len(COMPARISON)),
     "JW": (1, len(COMPARISON)),
-    "JR": (1, LINES - 1),
-    "JO": (1, LINES - 1),
-    "JM-": (1, LINES - 1),
+    "JR": (1, MEMORY_LINES - 1),
+    "JO": (1, MEMORY_LINES - 1),
+    "JM-": (1, MEMORY_LINES - 1),
     "DD": (0, UINT32),
     "WX": (0, len(AXES) - 1),
     "EI": (0, 0),
@@ -77,12 +77,12 @@ def split(token: str) -> tuple[str, str] | None:
     """Split a line: `("CV", "-5")`, `("&DI1", "0")`, `("&HSPD=", "500")`; None if unknown."""
     if token in _ALONE:
         return token, ""
-    if found := _REGISTER.fullmatch(token):
-        return (f"&{found[1]}", found[2]) if _names(found[1], int(found[2])) else None
-    if found := _TOKEN.fullmatch(token):
-        word, argument = found[1], found[2]
+    if match := _REGISTER.fullmatch(token):
+        return (f"&{match[1]}", match[2]) if _names(match[1], int(match[2])) else None
+    if match := _TOKEN.fullmatch(token):
+        word, argument = match[1], match[2]
         low, high = _ARGUMENTS[word]
-        right = low <= int(argument) <= high and (found[3] is not None) == (word in ("JI", "JW"))
+        right = low <= int(argument) <= high and (match[3] is not None) == (word in ("JI", "JW"))
         return (word, argument) if right else None
     return None
 
@@ -97,11 +97,11 @@ def _names(name: str, value: int) -> bool:
     return MOVES.get(name) == value or (name in WORDS and value == 0)
 
 
-def compile_(statements: Sequence[Statement]) -> Code:
+def compile_(statements: Sequence[ScriptStatement]) -> Code:
     """Compile a program whose blocks `script_checker` has approved."""
     code = Code()
-    for each in statements:
-        code.take(each)
+    for statement in statements:
+        code.take(statement)
     return code
 
 
@@ -125,7 +125,7 @@ class Code:
         """Let the jump of line `at` go to the next line."""
         self.lines[at] += str(len(self.lines) - at)
 
-    def take(self, each: Statement) -> None:
+    def take(self, each: ScriptStatement) -> None:
         self.line = each.line
         if each.kind == "block":
             self.block(each)
@@ -142,27 +142,27 @@ class Code:
         else:
             self.put(f"&{each.word}$0")
 
-    def assign(self, each: Statement) -> None:
+    def assign(self, each: ScriptStatement) -> None:
         """Compile an assignment: a calculation takes right, left, target; other values use one line or AM."""
         if each.op:
-            self.values((*reversed(each.values), Value(each.word)))
+            self.values((*reversed(each.values), ScriptValue(each.word)))
             self.put(f"OX{OPERATION[each.op]}")
         elif each.word[0] != "V" and each.values[0].constant is not None:
             self.put(f"&{each.word}=${each.values[0].constant}")
         else:
-            self.values((*each.values, Value(each.word)))
+            self.values((*each.values, ScriptValue(each.word)))
             self.put("AM")
 
-    def values(self, values: Sequence[Value]) -> None:
-        for each in values:
-            if each.constant is not None:
-                self.put(f"CV{each.constant}")
-            elif each.text[0] == "V":
-                self.put(f"VR{each.text[1:]}")
+    def values(self, values: Sequence[ScriptValue]) -> None:
+        for value in values:
+            if value.constant is not None:
+                self.put(f"CV{value.constant}")
+            elif value.text[0] == "V":
+                self.put(f"VR{value.text[1:]}")
             else:
-                self.put(f"&{each.text}$0")
+                self.put(f"&{value.text}$0")
 
-    def block(self, each: Statement) -> None:
+    def block(self, each: ScriptStatement) -> None:
         word = each.word
         if word in ("PRG", "SUB", "GOSUB"):
             self.put({"PRG": "PS", "SUB": "SS", "GOSUB": "GS"}[word] + str(each.number))
@@ -190,7 +190,7 @@ class Code:
                 self.here(skip)
             self.skips.append(self.condition(each, "JI") if word == "ELSEIF" else None)
 
-    def condition(self, each: Statement, jump: str) -> int:
+    def condition(self, each: ScriptStatement, jump: str) -> int:
         self.values(each.values)
         self.put(f"{jump}{COMPARISON[each.op]}$2")
         return self.put("JR")

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from multidrop.base.files import rows, split_lines
 from multidrop.dialects.editing import Word
 from multidrop.dialects.language import labelled
-from multidrop.dialects.program_files import BLANKS, Entry, Part, Problem
-from multidrop.families.pmx.manual.table import ELSEWHERE, Command, grouped, lookup
+from multidrop.dialects.program_files import BLANKS, LinePart, Problem, ProgramEntry
+from multidrop.families.pmx.manual.table import ELSEWHERE, PmxCommand, grouped, lookup
 
 # The words (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
 #
@@ -47,7 +47,7 @@ BLOCKS = ("PRG", "END", "SUB", "ENDSUB", "IF", "ELSEIF", "ELSE", "ENDIF", "WHILE
 
 
 @dataclass(frozen=True)
-class Register:
+class ScriptRegister:
     """A register or a command: its ASCII command, access, and the constants it accepts."""
 
     ascii: str
@@ -62,25 +62,27 @@ class Register:
         return not (self.readable or self.settable)
 
 
-def _words() -> dict[str, Register]:
-    found: dict[str, Register] = {}
+def _words() -> dict[str, ScriptRegister]:
+    registers: dict[str, ScriptRegister] = {}
     for row in rows(__file__, "script_words.csv"):
         names, access = [row["word"]], row["access"]
         if numbered := _NUMBERS.fullmatch(row["word"]):
             names = [f"{numbered[1]}{number}" for number in range(int(numbered[2]), int(numbered[3]) + 1)]
         low, high = int(row["low"] or INT32[0]), int(row["high"] or INT32[1])
-        found |= {name: Register(row["command"] or name, "R" in access, "W" in access, low, high) for name in names}
-    return found
+        registers |= {
+            name: ScriptRegister(row["command"] or name, "R" in access, "W" in access, low, high) for name in names
+        }
+    return registers
 
 
-WORDS: Mapping[str, Register] = _words()
+WORDS: Mapping[str, ScriptRegister] = _words()
 KEYWORDS: Mapping[str, tuple[str, str]] = {
     row["word"]: (row["syntax"], row["meaning"]) for row in rows(__file__, "script_keywords.csv")
 }
 """The words of programs alone: syntax and meaning."""
 
 
-def _command_of(word: str) -> Command | None:
+def _command_of(word: str) -> PmxCommand | None:
     """The row of the ASCII command that does what a word of a script does."""
     return lookup(ELSEWHERE.get(word, WORDS[word].ascii)) if word in WORDS else None
 
@@ -89,8 +91,8 @@ def meaning(word: str) -> str:
     """Return the meaning of a word in one line; empty for an unknown one."""
     if word in KEYWORDS:
         return KEYWORDS[word][1]
-    found, row = WORDS.get(word), _command_of(word)
-    return row.meaning if found is not None and row is not None else ""
+    register, row = WORDS.get(word), _command_of(word)
+    return row.meaning if register is not None and row is not None else ""
 
 
 def describe(word: str) -> list[str]:
@@ -98,14 +100,14 @@ def describe(word: str) -> list[str]:
     if word in KEYWORDS:
         syntax, what = KEYWORDS[word]
         return [f"{word}: {what}", *labelled([("syntax", syntax)])]
-    found, row = WORDS.get(word), _command_of(word)
-    if found is None or row is None:
+    register, row = WORDS.get(word), _command_of(word)
+    if register is None or row is None:
         return []
     facts = (
         ("value", row.takes),
-        ("constants", f"{found.low} to {found.high}" if found.settable and found.high < INT32[1] else ""),
+        ("constants", f"{register.low} to {register.high}" if register.settable and register.high < INT32[1] else ""),
         ("in programs", use(word)),
-        ("as command", command if (command := ELSEWHERE.get(word, found.ascii)) != word else ""),
+        ("as command", command if (command := ELSEWHERE.get(word, register.ascii)) != word else ""),
         ("note", row.note),
         ("manual", f"PMX-2ED-SA {row.section}"),
     )
@@ -125,13 +127,15 @@ def find(word: str) -> str:
 
 def use(word: str) -> str:
     """Say how programs use a register or a command; empty for any other word."""
-    found = WORDS.get(word)
-    if found is None:
+    register = WORDS.get(word)
+    if register is None:
         return ""
-    return " and ".join(use for use, can in (("read", found.readable), ("set", found.settable)) if can) or "executed"
+    return (
+        " and ".join(use for use, can in (("read", register.readable), ("set", register.settable)) if can) or "executed"
+    )
 
 
-def offered() -> list[tuple[str, Register | None]]:
+def offered() -> list[tuple[str, ScriptRegister | None]]:
     """Return every word, but the numbered variables; None for those of programs alone."""
     registers = [(name, word) for name, word in WORDS.items() if name not in VARIABLE_NAMES]
     return [*((name, None) for name in KEYWORDS), *registers]
@@ -147,23 +151,23 @@ _STARTS = re.compile(r"(HOME|HLHOME|LHOME|ZHOME|ZOME|JOG)[XY]|SR\d|JOYENA", re.A
 _WITH_NUMBER = ("PRG", "SUB", "GOSUB")
 
 
-def parts(line: str) -> list[Part]:
+def parts(line: str) -> list[LinePart]:
     code, semicolon, _ = line.partition(";")
-    found = [
-        Part(word.start, word.stop, kind)
+    line_parts = [
+        LinePart(word.start, word.stop, kind)
         for word in words(line)
         if (kind := kind_of(word.text, not code[: word.start].strip()))
     ]
-    return [*found, Part(len(code), len(line), "remark")] if semicolon else found
+    return [*line_parts, LinePart(len(code), len(line), "remark")] if semicolon else line_parts
 
 
 def words(line: str) -> list[Word]:
     """Return the words of a line; a sign at the end belongs to the words that have one."""
-    found = []
+    words_of_line = []
     for match in _WORD.finditer(line.partition(";")[0]):
         text = match[0] if match[0] in WORDS else match[0].rstrip("+-")
-        found.append(Word(match.start(), match.start() + len(text), text))
-    return found
+        words_of_line.append(Word(match.start(), match.start() + len(text), text))
+    return words_of_line
 
 
 def kind_of(word: str, first: bool) -> str:
@@ -175,16 +179,16 @@ def kind_of(word: str, first: bool) -> str:
     return "word" if word in WORDS or word[:4] == "WAIT" else ""
 
 
-def entries(text: str) -> list[Entry]:
+def entries(text: str) -> list[ProgramEntry]:
     """Return the numbers of the programs in a file, in order; lines without a PRG are program 0."""
     lines = [line.partition(";")[0].strip() for line in re.split(r"\r\n|\n|\r", text)]
-    found = [
-        Entry(match[1], number, f"SR{match[1]}=1")
+    entries_of_file = [
+        ProgramEntry(match[1], number, f"SR{match[1]}=1")
         for number, line in enumerate(lines, 1)
         if (match := _PROGRAM.fullmatch(line))
     ]
     first = next((number for number, line in enumerate(lines, 1) if line), 0)
-    return found or ([Entry("0", first, "SR0=1")] if first else [])
+    return entries_of_file or ([ProgramEntry("0", first, "SR0=1")] if first else [])
 
 
 _VALUE = r"-?\d+|[A-Za-z]\w*"
@@ -207,7 +211,7 @@ KNOWN = [*WORDS, *BLOCKS, *(f"WAIT{axis}" for axis in AXES)]
 
 
 @dataclass(frozen=True)
-class Value:
+class ScriptValue:
     """A number, or a register by its name."""
 
     text: str
@@ -220,7 +224,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class Statement:
+class ScriptStatement:
     """A line. `word` is the keyword, the register to set, the command, or the axes of a move (`X`, `Y`, `XY`).
 
     kind: block (a keyword of structure), set, delay, wait, move, command. `op` is a comparison or an operation.
@@ -228,7 +232,7 @@ class Statement:
 
     kind: str
     word: str
-    values: tuple[Value, ...] = ()
+    values: tuple[ScriptValue, ...] = ()
     op: str = ""
     line: int = field(default=0, compare=False)
     column: int = field(default=1, compare=False)
@@ -240,7 +244,7 @@ class Statement:
         return int(self.values[0].text)
 
     def __str__(self) -> str:
-        values = [each.text for each in self.values]
+        values = [value.text for value in self.values]
         if self.word in ("IF", "ELSEIF", "WHILE"):
             return f"{self.word} {values[0]}{self.op}{values[1]}"
         if self.kind == "block":
@@ -259,9 +263,9 @@ class _Wrong(Exception):
         self.column, self.what, self.hint = column, what, hint
 
 
-def parse(text: str) -> tuple[list[Statement], list[Problem]]:
+def parse(text: str) -> tuple[list[ScriptStatement], list[Problem]]:
     """Parse every line, and report the errors. Never fails."""
-    statements: list[Statement] = []
+    statements: list[ScriptStatement] = []
     problems: list[Problem] = []
     for number, line in enumerate(split_lines(text), 1):
         bare = line.partition(";")[0].rstrip(BLANKS)
@@ -275,59 +279,59 @@ def parse(text: str) -> tuple[list[Statement], list[Problem]]:
             head = _HEAD.match(_FOREIGN.split(bare, 1)[0])
             word = _meant(head[0].strip()) if head else ""
             statements.append(
-                Statement("wrong", (word if word in BLOCKS else ""), (), "", number, wrong.column, wrong=True)
+                ScriptStatement("wrong", (word if word in BLOCKS else ""), (), "", number, wrong.column, wrong=True)
             )
     return statements, problems
 
 
-def _statement(bare: str, line: int) -> Statement:
+def _statement(bare: str, line: int) -> ScriptStatement:
     start = len(bare) - len(bare.lstrip())
     text, column = bare[start:], start + 1
     for at, character in enumerate(text):
         if not " " <= character <= "~" and character != "\t":
             raise _Wrong(column + at, f"A-SCRIPT has no character {character!r}", "remarks begin with ;")
-    if found := _FOREIGN.search(text):
-        raise _Wrong(column + found.start(), f"{found[0]} begins no remark in A-SCRIPT", "remarks begin with ;")
+    if match := _FOREIGN.search(text):
+        raise _Wrong(column + match.start(), f"{match[0]} begins no remark in A-SCRIPT", "remarks begin with ;")
     if wrong := grouped(text):
         raise _Wrong(column, wrong)
-    if found := _BLOCK.fullmatch(text):
-        values, op = _condition(found[2], column + found.start(2), found[1])
-        return Statement("block", found[1], values, op, line, column)
-    if found := _NUMBERED.fullmatch(text):
-        return Statement("block", found[1], (_number(found, column),), "", line, column)
-    if (found := _PLAIN.fullmatch(text)) and found[1] != "ELSEIF":
-        return Statement("block", found[1], (), "", line, column)
-    if found := MOVE.fullmatch(text):
+    if match := _BLOCK.fullmatch(text):
+        values, op = _condition(match[2], column + match.start(2), match[1])
+        return ScriptStatement("block", match[1], values, op, line, column)
+    if match := _NUMBERED.fullmatch(text):
+        return ScriptStatement("block", match[1], (_number(match, column),), "", line, column)
+    if (match := _PLAIN.fullmatch(text)) and match[1] != "ELSEIF":
+        return ScriptStatement("block", match[1], (), "", line, column)
+    if match := MOVE.fullmatch(text):
         return _move(text, line, column)
-    if found := _SET.fullmatch(text):
-        return _set(found, line, column)
+    if match := _SET.fullmatch(text):
+        return _set(match, line, column)
     word = text.rstrip()
     if word[:4] == "WAIT" and word[4:] in tuple(AXES):
-        return Statement("wait", word[4:], (), "", line, column)
+        return ScriptStatement("wait", word[4:], (), "", line, column)
     if word in WORDS and WORDS[word].command:
-        return Statement("command", word, (), "", line, column)
+        return ScriptStatement("command", word, (), "", line, column)
     raise _unknown(word, column)
 
 
-def _number(found: re.Match[str], column: int) -> Value:
+def _number(found: re.Match[str], column: int) -> ScriptValue:
     word, many = found[1], PROGRAMS if found[1] == "PRG" else SUBROUTINES
     what = "programs" if word == "PRG" else "subroutines"
     if found[2] is None:
         raise _Wrong(column + len(found[0].rstrip()), f"{word} needs a number", f"{what} are 0 to {many - 1}")
     if _long(found[2]) or not 0 <= int(found[2]) < many:
         raise _Wrong(column + found.start(2), f"no {word} {found[2]}", f"{what} are 0 to {many - 1}")
-    return Value(str(int(found[2])), column + found.start(2))
+    return ScriptValue(str(int(found[2])), column + found.start(2))
 
 
-def _condition(text: str, column: int, word: str) -> tuple[tuple[Value, ...], str]:
-    found = _CONDITION.fullmatch(text)
-    if found is None:
+def _condition(text: str, column: int, word: str) -> tuple[tuple[ScriptValue, ...], str]:
+    match = _CONDITION.fullmatch(text)
+    if match is None:
         hint = f"as in {word} V1<10, with one of {' '.join(COMPARISONS)}"
         raise _Wrong(column + len(text) - len(text.lstrip()), f"{word} needs a condition between two values", hint)
-    return (_read(found, 1, column), _read(found, 3, column)), found[2]
+    return (_read(match, 1, column), _read(match, 3, column)), match[2]
 
 
-def _read(found: re.Match[str], group: int, column: int, high: int = INT32[1]) -> Value:
+def _read(found: re.Match[str], group: int, column: int, high: int = INT32[1]) -> ScriptValue:
     """A value to read: a number, or a readable register."""
     text, at = found[group], column + found.start(group)
     if text.lstrip("-").isdigit():
@@ -337,36 +341,36 @@ def _read(found: re.Match[str], group: int, column: int, high: int = INT32[1]) -
         raise _unknown(text, at)
     if not word.readable:
         raise _Wrong(at, f"{text} cannot be read in a program")
-    return Value(text, at)
+    return ScriptValue(text, at)
 
 
-def _constant(text: str, at: int, low: int, high: int) -> Value:
+def _constant(text: str, at: int, low: int, high: int) -> ScriptValue:
     if _long(text) or not low <= int(text) <= high:
         raise _Wrong(at, f"{text} is out of range", f"{low} to {high}")
-    return Value(str(int(text)), at)
+    return ScriptValue(str(int(text)), at)
 
 
 def _long(text: str) -> bool:
     return len(text.lstrip("-0")) > 10
 
 
-def _move(text: str, line: int, column: int) -> Statement:
+def _move(text: str, line: int, column: int) -> ScriptStatement:
     axes, values = "", []
-    for found in TARGET.finditer(text):
-        axis, at = found[1], column + found.start()
+    for match in TARGET.finditer(text):
+        axis, at = match[1], column + match.start()
         if axis not in AXES:
             raise _Wrong(at, f"no axis {axis}", "the axes are X and Y")
         if axis in axes or axes == "Y":
             raise _Wrong(at, "the targets of a move are X, Y, or X and then Y", "as in X1000Y2000")
         axes += axis
-        if not found[2].startswith("V"):
-            values.append(_constant(found[2], column + found.start(2), *INT32))
+        if not match[2].startswith("V"):
+            values.append(_constant(match[2], column + match.start(2), *INT32))
         else:
-            values.append(_read(found, 2, column))
-    return Statement("move", axes, tuple(values), "", line, column)
+            values.append(_read(match, 2, column))
+    return ScriptStatement("move", axes, tuple(values), "", line, column)
 
 
-def _set(found: re.Match[str], line: int, column: int) -> Statement:
+def _set(found: re.Match[str], line: int, column: int) -> ScriptStatement:
     target, at = found[1], column + found.start(1)
     word = WORDS.get(target)
     if word is None and target != "DELAY":
@@ -383,7 +387,7 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
     low, high = (0, 2**32 - 1) if word is None else (word.low, word.high)
     values = [_read(source, 2, base, max(high, INT32[1]))] + ([_read(source, 4, base)] if source[4] else [])
     if target[0] == "V":
-        return Statement("set", target, tuple(values), op, line, column)
+        return ScriptStatement("set", target, tuple(values), op, line, column)
     if op:
         raise _Wrong(base + source.start(2), f"{target} takes no operation", f"V0={found[2].strip()}, {target}=V0")
     value = values[0]
@@ -392,7 +396,7 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
     elif value.text[0] != "V":
         hint = f"V0={value.text}, then {target}=V0"
         raise _Wrong(value.column, f"{target} takes a number or a variable; {value.text} is a register", hint)
-    return Statement("delay" if word is None else "set", target, (value,), "", line, column)
+    return ScriptStatement("delay" if word is None else "set", target, (value,), "", line, column)
 
 
 def _unknown(text: str, column: int) -> _Wrong:

@@ -3,7 +3,7 @@
 `commands.csv` has the commands, `states.csv` the status numbers, `refusals.csv` the refusals. `shape` is the
 continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and a direction, `both` a direction for both axes,
 `1-8` a number, `place` positions. `access` is R, W or RW for a value (`NAME` reads, `NAME=value` writes), `-` for an
-action. The other columns are the fields of `Command`. Every cell says something, `-` for none, so that a new command
+action. The other columns are the fields of `PmxCommand`. Every cell says something, `-` for none, so that a new command
 answers every question. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
 """
 
@@ -22,7 +22,7 @@ PROBE, PROBED = "MULTIDROP", "simulator"
 """The request that distinguishes our simulator from a unit, and its reply."""
 
 
-class Motion(StrEnum):
+class PmxMotion(StrEnum):
     """What a command begins."""
 
     NONE = "-"
@@ -32,7 +32,7 @@ class Motion(StrEnum):
     PROGRAM = "program"
 
 
-class Kept(StrEnum):
+class PmxRetention(StrEnum):
     """What a value is."""
 
     NONE = "-"
@@ -44,7 +44,7 @@ class Kept(StrEnum):
     """A setting of communication, which acts after STORE and a power cycle."""
 
 
-class Position(StrEnum):
+class PmxPosition(StrEnum):
     """What writing a value does to positions."""
 
     NOTHING = "-"
@@ -72,7 +72,7 @@ class Corrects(StrEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Command:
+class PmxCommand:
     """A row of the table."""
 
     name: str
@@ -85,14 +85,14 @@ class Command:
     note: str
     starts: bool
     """Whether it can start motion or a program; for a value, when written. StepNLoop corrects a position by moving."""
-    motion: Motion
+    motion: PmxMotion
     low: float | None
     high: float | None
     """The range of a value that can be written and read; None: it is no number. Whole, unless with a point."""
     unit: str
     """The unit of a setting."""
-    kept: Kept
-    position: Position
+    kept: PmxRetention
+    position: PmxPosition
     corrects: Corrects
     guard: str
     """What a line does to which a person must agree first, a setting where a value is written; empty: it needs none."""
@@ -125,12 +125,12 @@ def _bound(text: str) -> float | None:
     return float(text) if "." in text else int(text)
 
 
-def record(row: Mapping[str, str]) -> Command:
+def record(row: Mapping[str, str]) -> PmxCommand:
     """Make the record of a row. Raises ValueError for a wrong cell."""
     if empty := [column for column, text in row.items() if not text]:
         raise ValueError(f"the row of {row['name']} says nothing of: {', '.join(empty)}")
     said = {column: "" if text == "-" else text for column, text in row.items()}
-    return Command(
+    return PmxCommand(
         name=row["name"],
         shape=row["shape"],
         access=row["access"],
@@ -139,21 +139,21 @@ def record(row: Mapping[str, str]) -> Command:
         section=row["section"],
         note=said["note"],
         starts={"yes": True, "no": False}[row["starts"]],
-        motion=Motion(row["motion"]),
+        motion=PmxMotion(row["motion"]),
         low=_bound(row["low"]),
         high=_bound(row["high"]),
         unit=said["unit"],
-        kept=Kept(row["kept"]),
-        position=Position(row["position"]),
+        kept=PmxRetention(row["kept"]),
+        position=PmxPosition(row["position"]),
         corrects=Corrects(row["corrects"]),
         guard=said["guard"],
         quiet=frozenset(said["quiet"].split()),
     )
 
 
-ROWS: tuple[Command, ...] = tuple(map(record, rows(__file__, "commands.csv")))
-COMMANDS: Mapping[str, Command] = {row.name: row for row in ROWS}
-WORDS: Mapping[str, Command] = {word: row for row in ROWS for word in row.words()}
+ROWS: tuple[PmxCommand, ...] = tuple(map(record, rows(__file__, "commands.csv")))
+COMMANDS: Mapping[str, PmxCommand] = {row.name: row for row in ROWS}
+WORDS: Mapping[str, PmxCommand] = {word: row for row in ROWS for word in row.words()}
 """Every word, with its axis, direction or number."""
 
 ELSEWHERE: Mapping[str, str] = {
@@ -173,11 +173,11 @@ def grouped(text: str) -> str:
 
     No command separates numbers by a comma or a space.
     """
-    found = _GROUPED.search(text)
-    return f"{found[0]} is not one number; write {re.sub(r'[^0-9]', '', found[0])}" if found else ""
+    match = _GROUPED.search(text)
+    return f"{match[0]} is not one number; write {re.sub(r'[^0-9]', '', match[0])}" if match else ""
 
 
-def lookup(word: str) -> Command | None:
+def lookup(word: str) -> PmxCommand | None:
     """Find the row of a command, with or without its continuation (`HSPDX`, `X1000`, `DO3=1`), in any case."""
     text = word.strip().upper().partition("=")[0].strip()
     if text in COMMANDS or text in WORDS:
@@ -189,8 +189,8 @@ def lookup(word: str) -> Command | None:
 
 def head(text: str) -> str:
     """The letters at the head of a line, in capitals."""
-    found = _HEAD.match(text.strip())
-    return found.group().upper() if found else ""
+    match = _HEAD.match(text.strip())
+    return match.group().upper() if match else ""
 
 
 def reads(text: str) -> bool:
@@ -204,21 +204,21 @@ def starts_motion(text: str) -> bool:
     return row is None or (row.starts and not reads(text))
 
 
-def those(fact: Callable[[Command], bool]) -> tuple[str, ...]:
+def those(fact: Callable[[PmxCommand], bool]) -> tuple[str, ...]:
     """The commands for which a fact holds, in the order of the table."""
     return tuple(row.name for row in ROWS if fact(row))
 
 
-MOTIONS = those(lambda row: row.motion in (Motion.MOVE, Motion.JOG, Motion.HOMING))
+MOTIONS = those(lambda row: row.motion in (PmxMotion.MOVE, PmxMotion.JOG, PmxMotion.HOMING))
 """Commands that start one motion. After it nothing moves by itself."""
-HOMINGS = those(lambda row: row.motion is Motion.HOMING)
-PROGRAMS = those(lambda row: row.motion is Motion.PROGRAM)
-WIRE = those(lambda row: row.kept is Kept.WIRE)
+HOMINGS = those(lambda row: row.motion is PmxMotion.HOMING)
+PROGRAMS = those(lambda row: row.motion is PmxMotion.PROGRAM)
+WIRE = those(lambda row: row.kept is PmxRetention.WIRE)
 """Settings of communication, which act after STORE and a power cycle."""
-SCALES = those(lambda row: row.position is Position.SCALES)
+SCALES = those(lambda row: row.position is PmxPosition.SCALES)
 """Settings of an axis that give a count its length and its direction."""
-RESCALING = those(lambda row: row.position in (Position.SCALES, Position.RATIO))
-RECOUNTING = those(lambda row: row.position is not Position.NOTHING)
+RESCALING = those(lambda row: row.position in (PmxPosition.SCALES, PmxPosition.RATIO))
+RECOUNTING = those(lambda row: row.position is not PmxPosition.NOTHING)
 """Values that change what positions count, or the positions."""
 
 
@@ -278,8 +278,8 @@ def _bit_name(mask: int) -> str:
 
 def status_words(status: int) -> tuple[str, ...]:
     """Describe a motor status; `at rest` where the axis makes no pulses."""
-    found = tuple(word for bit, word in BITS if status & bit)
-    return found if status & MOVING else ("at rest", *found)
+    words = tuple(word for bit, word in BITS if status & bit)
+    return words if status & MOVING else ("at rest", *words)
 
 
 def trouble_words(status: int) -> str:

@@ -1,7 +1,7 @@
 """One axis of a simulated PMX-2ED-SA: its counters, switches and latched limits, StepNLoop, homing, and its time.
 
 The motion is in `pulses`; what it is for is a word (`Doing`). A motion ends at its profile's end, at a limit, or by a
-stop. Nothing happens between events: `Axis.live(t)` looks at all that can have happened by a time. `motions` has the
+stop. Nothing happens between events: `PmxAxis.live(t)` looks at all that can have happened by a time. `motions` has the
 commands that begin and change motions. Speeds are pulses/s, times s.
 
 StepNLoop (manual 7.17). With it the position counter is a target in encoder counts. It advances with the pulses by
@@ -29,32 +29,32 @@ from multidrop.families.pmx.simulator.pulses import (
     STATES,
     Doing,
     LoopStatus,
+    PmxRotor,
     Pulses,
-    Rotor,
     paced,
 )
-from multidrop.families.pmx.simulator.settings import SCALE, Refusal, Settings, wrapped
+from multidrop.families.pmx.simulator.settings import SCALE, PmxRefusal, PmxSettings, wrapped
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import Pace, Profile
+from multidrop.simulator.kinematics import MotionPace, Profile
 from multidrop.simulator.world import World
 
 POLARITY_DIRECTION, POLARITY_HOME, POLARITY_LIMIT, POLARITY_INDEX = 1 << 1, 1 << 5, 1 << 6, 1 << 7
 POLARITY_DECODING, POLARITY_ENABLE = 8, 1 << 12
-LATE = 1e-9
+TIME_TOLERANCE = 1e-9
 """Seconds that are no time: less than rounding makes."""
 
 
-class Axis:
+class PmxAxis:
     """X or Y. Raises Refusal for what it does not take."""
 
-    def __init__(self, name: str, settings: Settings, world: World, spec: WorldSpec) -> None:
+    def __init__(self, name: str, settings: PmxSettings, world: World, spec: WorldSpec) -> None:
         self.name = name
         self.settings = settings
-        self.rotor = Rotor(world, spec)
+        self.rotor = PmxRotor(world, spec)
         self.pulses = Pulses(self.rotor)
         self.latched = 0
         self.goal = 0
-        self.homing: Homing | None = None
+        self.homing: PmxHoming | None = None
         self.loop = Loop(self)
         self.pulses.on_change = self.loop.rebase
 
@@ -71,7 +71,7 @@ class Axis:
         """Pulses for a unit of position or speed: with StepNLoop units are encoder counts."""
         return self.loop.ratio if self.loop.on else 1.0
 
-    def own_pace(self, *, strict: bool = True) -> Pace:
+    def own_pace(self, *, strict: bool = True) -> MotionPace:
         """Work out its pace alone: its own speeds, or the global ones where those are 0 (7.1).
 
         Raises Refusal for a low speed that does not fit, as for `paced`.
@@ -104,15 +104,15 @@ class Axis:
     def set_position(self, value: int, t: float) -> None:
         """`PX=`: set the counter at rest. With StepNLoop it follows the encoder and cannot be set (8.1.2)."""
         if self.pulses.profile.moving(t):
-            raise Refusal("?Moving")
+            raise PmxRefusal("?Moving")
         if self.loop.on:
-            raise Refusal
+            raise PmxRefusal
         self.pulses.set_counter(value, t)
 
     def set_encoder(self, value: int, t: float) -> None:
         """`EX=`: set the counter at rest; with StepNLoop the target moves along."""
         if self.pulses.profile.moving(t):
-            raise Refusal("?Moving")
+            raise PmxRefusal("?Moving")
         self.loop.shift(value - self.rotor.encoder(t))
         self.rotor.set_encoder(value, t)
 
@@ -145,13 +145,13 @@ class Axis:
         self.latched = 0
         self.loop.clear(t)
 
-    def start(self, doing: Doing, profile: Profile, t: float, pace: Pace) -> None:
+    def start(self, doing: Doing, profile: Profile, t: float, pace: MotionPace) -> None:
         """Begin a motion and deal at once with what it meets at once."""
         self.pulses.begin(doing, profile, t, pace)
         self.live(t)
 
-    def home(self, word: str, direction: float, pace: Pace, t: float) -> None:
-        self.homing = Homing(self, word, direction, pace, t)
+    def home(self, word: str, direction: float, pace: MotionPace, t: float) -> None:
+        self.homing = PmxHoming(self, word, direction, pace, t)
         self.live(t)
 
     def stop(self, t: float) -> None:
@@ -186,7 +186,7 @@ class Axis:
             if before.moving(t):
                 self._meet_limits(before.direction(t), t)
             done = self.pulses.doing
-            if done is not Doing.NOTHING and self.homing is None and self.pulses.profile.end <= t + LATE:
+            if done is not Doing.NOTHING and self.homing is None and self.pulses.profile.end <= t + TIME_TOLERANCE:
                 self.pulses.rest(t)  # the target is what the motion was for, or where it was stopped
                 if done is Doing.STOPPING:
                     self.loop.stay(t)
@@ -215,7 +215,7 @@ _HALF, _NEAR = 0.5, 1e-6
 class Loop:
     """StepNLoop of one axis. `error` is 0 or a status of table 7.9."""
 
-    def __init__(self, axis: Axis) -> None:
+    def __init__(self, axis: PmxAxis) -> None:
         self._axis = axis
         self._pulses = axis.pulses
         self.on = False
@@ -331,10 +331,10 @@ class Until(Enum):
 Steps = Generator[Until, float, None]
 
 
-class Homing:
+class PmxHoming:
     """A routine at work on one axis. `direction` is that of the search, 1 or -1; `word` is its ASCII word."""
 
-    def __init__(self, axis: Axis, word: str, direction: float, pace: Pace, t: float) -> None:
+    def __init__(self, axis: PmxAxis, word: str, direction: float, pace: MotionPace, t: float) -> None:
         self._axis, self.word, self.direction, self.pace = axis, word, direction, pace
         self._pulses = axis.pulses
         self.done = False
@@ -419,10 +419,10 @@ class Homing:
         if awaited is Until.INDEX:
             self._find_index(t)
             return t >= self._index_at
-        return profile.end <= t + LATE
+        return profile.end <= t + TIME_TOLERANCE
 
 
-def home_input(homing: Homing) -> Steps:
+def home_input(homing: PmxHoming) -> Steps:
     """`H`: move at high speed to the home input; 0 is there, the motor stops a ramp beyond it (7.10.1)."""
     homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
@@ -432,7 +432,7 @@ def home_input(homing: Homing) -> Steps:
     homing.stop()
 
 
-def limit(homing: Homing) -> Steps:
+def limit(homing: PmxHoming) -> Steps:
     """`L`: move at high speed to the limit, and back by LCA; 0 is there (7.10.2)."""
     homing.run(homing.direction, homing.pace.vm)
     yield Until.LIMIT
@@ -443,7 +443,7 @@ def limit(homing: Homing) -> Steps:
     homing.zero()
 
 
-def home_and_index(homing: Homing) -> Steps:
+def home_and_index(homing: PmxHoming) -> Steps:
     """`ZH`: move to the home input, and on at low speed to the next index mark, which is 0 (7.10.3)."""
     homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
@@ -454,7 +454,7 @@ def home_and_index(homing: Homing) -> Steps:
     homing.zero()
 
 
-def index(homing: Homing) -> Steps:
+def index(homing: PmxHoming) -> Steps:
     """`Z`: move at low speed to the next index mark, which is 0 (7.10.4)."""
     homing.run(homing.direction, homing.pace.vi)
     yield Until.INDEX
@@ -462,7 +462,7 @@ def index(homing: Homing) -> Steps:
     homing.zero()
 
 
-def home_twice(homing: Homing) -> Steps:
+def home_twice(homing: PmxHoming) -> Steps:
     """`HL`: move to the home input, back past it by HCA, and at low speed to it again, which is 0 (7.10.5)."""
     homing.run(homing.direction, homing.pace.vm)
     yield Until.HOME
@@ -481,7 +481,7 @@ def home_twice(homing: Homing) -> Steps:
     homing.stop()
 
 
-ROUTINES: dict[str, tuple[Callable[[Homing], Steps], LoopStatus]] = {
+ROUTINES: dict[str, tuple[Callable[[PmxHoming], Steps], LoopStatus]] = {
     "H": (home_input, LoopStatus.HOMING),
     "L": (limit, LoopStatus.LIMIT_HOMING),
     "ZH": (home_and_index, LoopStatus.Z_HOMING),

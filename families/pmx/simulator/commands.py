@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 
 from multidrop.families.pmx.simulator import motions
-from multidrop.families.pmx.simulator.axis import Axis
+from multidrop.families.pmx.simulator.axis import PmxAxis
 from multidrop.families.pmx.simulator.controller import PmxController
-from multidrop.families.pmx.simulator.settings import AXES, INT32, REGISTERS, SCALE, Refusal, wrapped
+from multidrop.families.pmx.simulator.settings import AXES, INT32, REGISTERS, SCALE, PmxRefusal, wrapped
 
 MODEL = "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
@@ -24,7 +24,7 @@ _INDEXED = re.compile(r"([A-Z]{1,2})(\d{1,6})", re.ASCII)
 
 
 @dataclass(frozen=True)
-class Word:
+class PmxWord:
     """A word: what it reads, what it sets, what it does; None: it has no such use.
 
     All are called with the controller, in `AXIS_WORDS` with the axis too, and the time last; `set` with the text of the
@@ -48,15 +48,15 @@ class BitWord:
 def number(text: str, low: int = -INT32, high: int = INT32 - 1, error: str = INVALID) -> int:
     """Read a whole number in a range. Raises Refusal."""
     if not _INTEGER.fullmatch(text) or not low <= int(text) <= high:
-        raise Refusal(error)
+        raise PmxRefusal(error)
     return int(text)
 
 
-def _both(read: Callable[[PmxController, Axis, float], int]) -> Callable[[PmxController, float], str]:
+def _both(read: Callable[[PmxController, PmxAxis, float], int]) -> Callable[[PmxController, float], str]:
     return lambda pmx, t: ":".join(str(read(pmx, axis, t)) for axis in pmx.axes)
 
 
-def _each(do: Callable[[PmxController, Axis, float], None]) -> Callable[[PmxController, float], None]:
+def _each(do: Callable[[PmxController, PmxAxis, float], None]) -> Callable[[PmxController, float], None]:
     def all_of_them(pmx: PmxController, t: float) -> None:
         for axis in pmx.axes:
             do(pmx, axis, t)
@@ -64,17 +64,17 @@ def _each(do: Callable[[PmxController, Axis, float], None]) -> Callable[[PmxCont
     return all_of_them
 
 
-def _speed(pmx: PmxController, axis: Axis, t: float) -> int:
+def _speed(pmx: PmxController, axis: PmxAxis, t: float) -> int:
     return axis.speed(t)
 
 
-def _delta(pmx: PmxController, axis: Axis, t: float) -> int:
+def _delta(pmx: PmxController, axis: PmxAxis, t: float) -> int:
     return round(axis.loop.delta(t))
 
 
 def _set_name(pmx: PmxController, text: str, t: float) -> None:
     if not re.fullmatch(MODEL + r"\d\d", text, re.ASCII):
-        raise Refusal(INVALID)
+        raise PmxRefusal(INVALID)
     pmx.settings.wanted = text[-2:]
 
 
@@ -100,50 +100,50 @@ def _set_sticks(pmx: PmxController, text: str, t: float) -> None:
 def _steer(pmx: PmxController, mask: int, t: float) -> None:
     added = mask & ~pmx.settings["JO"]
     if any(axis.pulses.profile.moving(t) for n, axis in enumerate(pmx.axes) if added >> n & 1):
-        raise Refusal(MOVING)
+        raise PmxRefusal(MOVING)
     pmx.set_joystick(mask, t)
 
 
-WORDS: dict[str, Word] = {
-    "ABORT": Word(do=_each(PmxController.abort)),
-    "ABS": Word(do=_set_mode(False)),
-    "CLR": Word(do=_each(PmxController.clear)),
-    "CLRS": Word(do=_each(PmxController.clear)),
-    "DI": Word(get=lambda pmx, t: pmx.inputs(t)),
-    "DN": Word(get=lambda pmx, t: MODEL + pmx.settings.wanted, set=_set_name),
-    "DO": Word(get=lambda pmx, t: pmx.outputs, set=_set_outputs),
-    "EO": Word(get=lambda pmx, t: pmx.enabled, set=_set_enabled),
-    "ID": Word(get=lambda pmx, t: pmx.product),
-    "INC": Word(do=_set_mode(True)),
-    "JF": Word(do=lambda pmx, t: _steer(pmx, 0, t)),
-    "JO": Word(do=lambda pmx, t: _steer(pmx, 3, t), set=_set_sticks),
-    "JOYENA": Word(set=_set_sticks),
-    "MM": Word(get=lambda pmx, t: int(pmx.incremental)),
-    "MST": Word(get=_both(PmxController.status)),
-    "PS": Word(get=_both(_speed)),
-    "STOP": Word(do=_each(PmxController.stop)),
-    "STORE": Word(do=lambda pmx, t: pmx.settings.store()),
-    "VER": Word(get=lambda pmx, t: pmx.version),
+WORDS: dict[str, PmxWord] = {
+    "ABORT": PmxWord(do=_each(PmxController.abort)),
+    "ABS": PmxWord(do=_set_mode(False)),
+    "CLR": PmxWord(do=_each(PmxController.clear)),
+    "CLRS": PmxWord(do=_each(PmxController.clear)),
+    "DI": PmxWord(get=lambda pmx, t: pmx.inputs(t)),
+    "DN": PmxWord(get=lambda pmx, t: MODEL + pmx.settings.wanted, set=_set_name),
+    "DO": PmxWord(get=lambda pmx, t: pmx.outputs, set=_set_outputs),
+    "EO": PmxWord(get=lambda pmx, t: pmx.enabled, set=_set_enabled),
+    "ID": PmxWord(get=lambda pmx, t: pmx.product),
+    "INC": PmxWord(do=_set_mode(True)),
+    "JF": PmxWord(do=lambda pmx, t: _steer(pmx, 0, t)),
+    "JO": PmxWord(do=lambda pmx, t: _steer(pmx, 3, t), set=_set_sticks),
+    "JOYENA": PmxWord(set=_set_sticks),
+    "MM": PmxWord(get=lambda pmx, t: int(pmx.incremental)),
+    "MST": PmxWord(get=_both(PmxController.status)),
+    "PS": PmxWord(get=_both(_speed)),
+    "STOP": PmxWord(do=_each(PmxController.stop)),
+    "STORE": PmxWord(do=lambda pmx, t: pmx.settings.store()),
+    "VER": PmxWord(get=lambda pmx, t: pmx.version),
 }
 
-AXIS_WORDS: dict[str, Word] = {
-    "ABORT": Word(do=PmxController.abort),
-    "CLR": Word(do=PmxController.clear),
-    "CLRS": Word(do=PmxController.clear),
-    "D": Word(get=_delta),
-    "DX": Word(get=_delta),
-    "E": Word(
+AXIS_WORDS: dict[str, PmxWord] = {
+    "ABORT": PmxWord(do=PmxController.abort),
+    "CLR": PmxWord(do=PmxController.clear),
+    "CLRS": PmxWord(do=PmxController.clear),
+    "D": PmxWord(get=_delta),
+    "DX": PmxWord(get=_delta),
+    "E": PmxWord(
         get=lambda pmx, axis, t: wrapped(axis.rotor.encoder(t)),
         set=lambda pmx, axis, text, t: axis.set_encoder(number(text), t),
     ),
-    "MST": Word(get=PmxController.status),
-    "P": Word(
+    "MST": PmxWord(get=PmxController.status),
+    "P": PmxWord(
         get=lambda pmx, axis, t: axis.position(t), set=lambda pmx, axis, text, t: axis.set_position(number(text), t)
     ),
-    "PS": Word(get=_speed),
-    "SLS": Word(get=lambda pmx, axis, t: axis.loop.status),
-    "SSPD": Word(set=lambda pmx, axis, text, t: motions.respeed(axis, number(text), t)),
-    "STOP": Word(do=PmxController.stop),
+    "PS": PmxWord(get=_speed),
+    "SLS": PmxWord(get=lambda pmx, axis, t: axis.loop.status),
+    "SSPD": PmxWord(set=lambda pmx, axis, text, t: motions.respeed(axis, number(text), t)),
+    "STOP": PmxWord(do=PmxController.stop),
 }
 
 
@@ -180,12 +180,12 @@ def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
         text = "" if ratio is None else str(int(ratio.to_integral_value(ROUND_HALF_UP)))
     value = number(text)
     if not register.low <= value <= register.high:
-        raise Refusal("?Low speed out of range" if name.startswith("LSPD") else INVALID)
+        raise PmxRefusal("?Low speed out of range" if name.startswith("LSPD") else INVALID)
     axis = pmx.axis(name[-1]) if name[-1] in AXES else None
     if register.idle and axis is not None and (axis.pulses.profile.moving(t) or axis.homing):
-        raise Refusal(MOVING)
+        raise PmxRefusal(MOVING)
     if axis is not None and kind == "SL" and value and pmx.settings["JO"] >> AXES.index(axis.name) & 1:
-        raise Refusal
+        raise PmxRefusal
     pmx.settings[name] = value
     if name == "TOC":
         pmx.heard(t)
@@ -245,7 +245,7 @@ class CommandedController(PmxController):
         """Carry out one ASCII command; give its reply without CR."""
         try:
             reply = _answer(self, text, now)
-        except Refusal as refusal:
+        except PmxRefusal as refusal:
             reply = str(refusal) or None
         self.look(now)
         return f"?{text}" if reply is None else reply
@@ -267,13 +267,13 @@ def _answer(pmx: PmxController, text: str, t: float) -> str | None:
     if indexed and indexed[1] in (*BIT_WORDS, "JL", "JV"):
         return _answer_bit(pmx, indexed[1], int(indexed[2]), given, t)
     for pattern, form in _FORMS:
-        if found := pattern.fullmatch(text):
-            _move(pmx, form, found.groups(), t)
+        if match := pattern.fullmatch(text):
+            _move(pmx, form, match.groups(), t)
             return OK
     return None
 
 
-def _use(word: Word, value: str | None, whose: tuple[object, ...], t: float) -> str | None:
+def _use(word: PmxWord, value: str | None, whose: tuple[object, ...], t: float) -> str | None:
     """Read, set or execute a word; None if the word has no such use."""
     if value is not None and word.set is not None:
         word.set(*whose, value, t)
@@ -286,12 +286,12 @@ def _use(word: Word, value: str | None, whose: tuple[object, ...], t: float) -> 
 
 def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t: float) -> str | None:
     if name in ("JL", "JV"):
-        raise Refusal(INDEX)
+        raise PmxRefusal(INDEX)
     word = BIT_WORDS.get(name)
     if word is None or (name == "EO" and not 1 <= index <= word.count):
         return None  # a third driver belongs to a larger model, and is not an index
     if not 1 <= index <= word.count:
-        raise Refusal(INDEX)
+        raise PmxRefusal(INDEX)
     if value is None:
         return str(word.get(pmx, index - 1, t))
     if word.set is None:

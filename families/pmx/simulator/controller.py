@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from math import inf
 
-from multidrop.families.pmx.simulator.axis import Axis
-from multidrop.families.pmx.simulator.motions import Line, Stick, go
+from multidrop.families.pmx.simulator.axis import PmxAxis
+from multidrop.families.pmx.simulator.motions import Stick, StraightMove, go
 from multidrop.families.pmx.simulator.pulses import JOYSTICK, TIMED_OUT, Doing
-from multidrop.families.pmx.simulator.settings import AXES, Settings
+from multidrop.families.pmx.simulator.settings import AXES, PmxSettings
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.world import World
 
@@ -29,7 +29,7 @@ BOTH = 3
 class Watchdog:
     """The time-out watchdog (TOC): `alarms` has a bit for each axis whose alarm is not cleared."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: PmxSettings) -> None:
         self._settings = settings
         self._heard_at = 0.0
         self.alarms = 0
@@ -61,13 +61,13 @@ class PmxController:
     """One controller, without power at first."""
 
     def __init__(self, number: str, worlds: tuple[World, World], specs: tuple[WorldSpec, WorldSpec]) -> None:
-        self.settings: Settings = Settings(number)
+        self.settings: PmxSettings = PmxSettings(number)
         self.worlds = worlds
-        self.axes: tuple[Axis, Axis] = (
-            Axis("X", self.settings, worlds[0], specs[0]),
-            Axis("Y", self.settings, worlds[1], specs[1]),
+        self.axes: tuple[PmxAxis, PmxAxis] = (
+            PmxAxis("X", self.settings, worlds[0], specs[0]),
+            PmxAxis("Y", self.settings, worlds[1], specs[1]),
         )
-        self.line = Line(self.axes, self.settings)
+        self.line = StraightMove(self.axes, self.settings)
         self.sticks = tuple(Stick(axis) for axis in self.axes)
         self.powered: bool = False
         self.supplied: bool = True
@@ -158,7 +158,7 @@ class PmxController:
         """`DI`: a bit is 1 if the input is at ground; with POL's bit 10, if it is not."""
         inverted = bool(self.settings["POLX"] & POLARITY_DI)
         grounded = [any(world.level(n + 1, now) == 0 for world in self.worlds) for n in range(INPUTS)]
-        return sum((each != inverted) << n for n, each in enumerate(grounded))
+        return sum((ground != inverted) << n for n, ground in enumerate(grounded))
 
     def output_level(self, number: int) -> int:
         """The level at a digital output, from 1 on: 0 if it sinks, 1 if it is pulled up."""
@@ -169,13 +169,13 @@ class PmxController:
         """`AI1`, `AI2`: millivolts."""
         return min(self.worlds[number - 1].analog(now), 5000)
 
-    def status(self, axis: Axis, t: float) -> int:
+    def status(self, axis: PmxAxis, t: float) -> int:
         """`MSTX`, with joystick and time-out."""
         n = AXES.index(axis.name)
         stick = self.sticks[n].due is not None
         return axis.status(t) | stick * JOYSTICK | (self.watchdog.alarms >> n & 1) * TIMED_OUT
 
-    def go(self, axis: Axis, value: int, t: float) -> None:
+    def go(self, axis: PmxAxis, value: int, t: float) -> None:
         """`X1000`: move to a position, or by a distance."""
         go(axis, value + (axis.position(t) if self.incremental else 0), t)
 
@@ -184,19 +184,19 @@ class PmxController:
         by = [axis.position(t) if self.incremental else 0 for axis in self.axes]
         self.line.begin((values[0] + by[0], values[1] + by[1]), t)
 
-    def stop(self, axis: Axis, t: float) -> None:
+    def stop(self, axis: PmxAxis, t: float) -> None:
         """`STOPX`: decelerate; a line stops as a whole, and the joystick releases the axis."""
-        for each in self.line.others(axis):
-            self._release(each, t)
-            each.stop(t)
+        for other in self.line.others(axis):
+            self._release(other, t)
+            other.stop(t)
 
-    def abort(self, axis: Axis, t: float) -> None:
+    def abort(self, axis: PmxAxis, t: float) -> None:
         """`ABORTX`: stop at once; a line stops as a whole, and the joystick releases the axis."""
-        for each in self.line.others(axis):
-            self._release(each, t)
-            each.abort(t)
+        for other in self.line.others(axis):
+            self._release(other, t)
+            other.abort(t)
 
-    def clear(self, axis: Axis, t: float) -> None:
+    def clear(self, axis: PmxAxis, t: float) -> None:
         """`CLRX`: clear limit and StepNLoop errors and the watchdog's alarm."""
         axis.clear(t)
         self.watchdog.clear(AXES.index(axis.name), t)
@@ -216,20 +216,20 @@ class PmxController:
                 axis.stop(t)
             stick.switch(on, t)
 
-    def _release(self, axis: Axis, t: float) -> None:
+    def _release(self, axis: PmxAxis, t: float) -> None:
         n = AXES.index(axis.name)
         self.sticks[n].switch(False, t)
         self.settings["JO"] &= ~(1 << n)
 
-    def axis(self, name: str) -> Axis:
+    def axis(self, name: str) -> PmxAxis:
         return self.axes[AXES.index(name)]
 
     def moving(self, axis: str) -> bool:
         """Whether an axis moves: pulses, a homing that goes on, a correction."""
-        each = self.axis(axis)
-        return each.pulses.profile.moving(self.now) or each.homing is not None
+        own = self.axis(axis)
+        return own.pulses.profile.moving(self.now) or own.homing is not None
 
     def troubled(self, axis: str) -> bool:
         """Whether a limit error or a StepNLoop error is latched."""
-        each = self.axis(axis)
-        return bool(each.trouble or each.loop.error)
+        own = self.axis(axis)
+        return bool(own.trouble or own.loop.error)

@@ -22,11 +22,11 @@ import re
 from multidrop.base.errors import Diagnostic
 from multidrop.families.pmx.manual import program_file
 from multidrop.families.pmx.manual.table import PROBE, PROBED
-from multidrop.families.pmx.simulator.axis import Axis
+from multidrop.families.pmx.simulator.axis import PmxAxis
 from multidrop.families.pmx.simulator.commands import INDEX, INVALID, OK, CommandedController, number
 from multidrop.families.pmx.simulator.controller import BAUDS
-from multidrop.families.pmx.simulator.programs import Programs
-from multidrop.families.pmx.simulator.settings import VARIABLES, Refusal
+from multidrop.families.pmx.simulator.programs import PmxInterpreter
+from multidrop.families.pmx.simulator.settings import VARIABLES, PmxRefusal
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.wire import Port, Transmission
 from multidrop.simulator.world import World
@@ -35,27 +35,27 @@ CR, LF, AT = 0x0D, 0x0A, 0x40
 ERASERS = frozenset({0x08, 0x7F})
 """Backspace and Delete."""
 LINE_BUFFER = 64
-LINES, PROGRAMS = 1275, 2
+MEMORY_LINES, PROGRAMS = 1275, 2
 FOR_PROGRAMS = "JOYENA="
 """A command that only a program can send (7.15)."""
 _INDEXED = re.compile(r"(SASTAT|SPC|[A-Z]{1,2})(\d{1,6})", re.ASCII)
 
 
-COUNTS = {"GS": 32, "SA": LINES, "SASTAT": PROGRAMS, "SPC": PROGRAMS, "SR": PROGRAMS, "V": VARIABLES}
+COUNTS = {"GS": 32, "SA": MEMORY_LINES, "SASTAT": PROGRAMS, "SPC": PROGRAMS, "SR": PROGRAMS, "V": VARIABLES}
 """Words about programs (manual 7.19, table 9.0), and the ends of their indices."""
 
 
-def answer_program(programs: Programs, text: str, t: float) -> str | None:
+def answer_program(programs: PmxInterpreter, text: str, t: float) -> str | None:
     """Carry out a host's command about programs; None if it is about something else."""
     if text == PROBE:
         return PROBED
     if text.startswith(FOR_PROGRAMS):
         return f"?{text}"
     head, sign, value = text.partition("=")
-    found = _INDEXED.fullmatch(head + "0" if head == "SASTAT" else head)
-    if found is None or found[1] not in COUNTS:
+    match = _INDEXED.fullmatch(head + "0" if head == "SASTAT" else head)
+    if match is None or match[1] not in COUNTS:
         return None
-    word, index = found[1], int(found[2])
+    word, index = match[1], int(match[2])
     if index >= COUNTS[word]:
         return f"?{text}" if COUNTS[word] == PROGRAMS else INDEX
     reply = ""
@@ -78,7 +78,7 @@ def answer_program(programs: Programs, text: str, t: float) -> str | None:
             case "V", "=":
                 programs.variables[index] = number(value)
                 reply = OK
-    except Refusal as refusal:
+    except PmxRefusal as refusal:
         reply = str(refusal)
     return reply or f"?{text}"
 
@@ -93,7 +93,7 @@ class PmxDevice:
         specs = (spec.world, spec.further[0] if spec.further else WorldSpec())
         self.worlds = (World(specs[0]), World(specs[1]))
         self.controller = CommandedController(spec.name, self.worlds, specs)
-        self.programs = Programs(self.controller, spec.instruction_us / 1e6)
+        self.programs = PmxInterpreter(self.controller, spec.instruction_us / 1e6)
         self.controller.settings.variables = self.programs.variables
         self.controller.settings["DB"] = next((code for code, each in BAUDS.items() if each == baud), 1)
         self.controller.settings.store()
@@ -101,7 +101,7 @@ class PmxDevice:
         own = spec.identity
         self.controller.product = own.part or self.controller.product
         self.controller.version = own.version or self.controller.version
-        for key, begin in (("encoder", Axis.set_encoder), ("position", Axis.set_position)):
+        for key, begin in (("encoder", PmxAxis.set_encoder), ("position", PmxAxis.set_position)):
             for axis, count in zip(self.controller.axes, own.counters.get(key, ()), strict=False):
                 begin(axis, count, 0.0)
         for name, value in (*spec.assignments(), *spec.variables.items()):

@@ -22,7 +22,7 @@ from multidrop.families.pmx.simulator.axis import Until
 from multidrop.families.pmx.simulator.commands import MODEL
 from multidrop.families.pmx.simulator.controller import BAUDS
 from multidrop.families.pmx.simulator.device import PROGRAMS, PmxDevice, PmxPort
-from multidrop.families.pmx.simulator.pulses import TURN
+from multidrop.families.pmx.simulator.pulses import PULSES_A_TURN
 from multidrop.families.pmx.simulator.settings import AXES, VARIABLES
 from multidrop.simulator.cell.drive_keys import (
     ENCODER_KEYS,
@@ -38,11 +38,11 @@ from multidrop.simulator.cell.drive_keys import (
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
-from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
+from multidrop.simulator.cell.writer import CellEntry, DriveText, plain, remark
 from multidrop.simulator.family import Effort, Place, Shadow, SimulatedFamily, StoredProgram, Unit, UsbSide
 
 NAMES_OF_AXES = ("x", "y")
-INPUTS, COUNTS = range(1, 9), 5000
+INPUTS, ANALOG_FULL_SCALE = range(1, 9), 5000
 """Digital inputs, and the end of scale of the analog inputs in millivolts."""
 NAMES = tuple(f"V{n}" for n in range(VARIABLES))
 """The variables of its programs."""
@@ -105,7 +105,10 @@ def _shadow(device: PmxDevice) -> Shadow:
             axis.set_position(position, now)
 
     def efforts() -> dict[str, Effort]:
-        return {name: Effort(axis.pulses.profile, TURN, axis.unit, stalls=axis.loop.on) for name, axis in axes.items()}
+        return {
+            name: Effort(axis.pulses.profile, PULSES_A_TURN, axis.unit, stalls=axis.loop.on)
+            for name, axis in axes.items()
+        }
 
     def awaits(name: str, now: float) -> str | None:  # noqa: ARG001
         homing = axes[name].homing
@@ -135,7 +138,7 @@ class SimulatedPmx(SimulatedFamily):
         settings = read_settings(table.table("set", "set"), _check_setting)
         scales = read_units(table, NAMES_OF_AXES)
         geared = {axis: _axis_scale(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
-        x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, geared)
+        x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, ANALOG_FULL_SCALE, geared)
         return DriveSpec(
             **common,
             name=name,
@@ -157,7 +160,7 @@ class SimulatedPmx(SimulatedFamily):
             worlds=dict(zip(NAMES_OF_AXES, device.worlds, strict=True)),
             shadow=_shadow(device),
             inputs=INPUTS,
-            counts=COUNTS,
+            counts=ANALOG_FULL_SCALE,
             on_usb=UsbSide(
                 lambda: f"2ED{device.controller.settings.number}", lambda text, now: device.execute(text, now)
             ),
@@ -165,22 +168,30 @@ class SimulatedPmx(SimulatedFamily):
 
     @classmethod
     def describe(cls, snapshot: Snapshot) -> DriveText:
-        readings = [each for each in snapshot.readings.readings if each.name != "DN"]
+        readings = [reading for reading in snapshot.readings.readings if reading.name != "DN"]
         return DriveText(
             personality="PMX",
             name=snapshot.name,
             remarks=snapshot.remarks,
             unread=snapshot.readings.unread,
             program=_program(snapshot),
-            settings=[Entry(each.name, each.value, remark(each)) for each in readings if each.section != USERS],
-            variables=[Entry(each.name, each.value) for each in readings if each.section == USERS and each.value],
+            settings=[
+                CellEntry(reading.name, reading.value, remark(reading))
+                for reading in readings
+                if reading.section != USERS
+            ],
+            variables=[
+                CellEntry(reading.name, reading.value)
+                for reading in readings
+                if reading.section == USERS and reading.value
+            ],
             identity=[
                 *(
-                    Entry(key, plain(text))
+                    CellEntry(key, plain(text))
                     for key, text in (("part", snapshot.part), ("version", snapshot.version))
                     if text
                 ),
-                *(Entry(key, list(counts)) for key, counts in snapshot.counters.items()),
+                *(CellEntry(key, list(counts)) for key, counts in snapshot.counters.items()),
             ],
             worlds=_worlds(snapshot),
             baud=snapshot.baud,

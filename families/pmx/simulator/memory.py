@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from multidrop.families.pmx.manual.script_compiler import ERASED, LINES, split
+from multidrop.families.pmx.manual.script_compiler import ERASED, MEMORY_LINES, split
 
-LONGEST = 24
+LONGEST_STORED_LINE = 24
 """Characters of a line; ten is the longest that units have shown, our names take more."""
 
 
-class Memory:
+class PmxMemory:
     """1275 lines. They are kept at once, without STORE."""
 
     def __init__(self) -> None:
-        self.code: list[tuple[str, str] | None] = [None] * LINES
+        self.code: list[tuple[str, str] | None] = [None] * MEMORY_LINES
         """Each line taken apart; None for one that cannot be carried out."""
-        self._lines = [ERASED] * LINES
+        self._lines = [ERASED] * MEMORY_LINES
         self._starts: dict[int, int] = {}
         self._subroutines: dict[int, int] = {}
         self._indexed = True
@@ -36,7 +36,7 @@ class Memory:
 
     def load(self, lines: Sequence[str]) -> None:
         """Fill the memory with compiled lines, and erase the rest."""
-        for number in range(LINES):
+        for number in range(MEMORY_LINES):
             self.store(number, lines[number] if number < len(lines) else ERASED)
 
     def start_of(self, program: int) -> int | None:
@@ -58,8 +58,8 @@ class Memory:
             return
         self._starts, self._subroutines, self._indexed = {}, {}, True
         inside, loose = "", None
-        for number, found in enumerate(self.code):
-            word, argument = found or ("", "")
+        for number, stored in enumerate(self.code):
+            word, argument = stored or ("", "")
             if word == "PS":
                 self._starts.setdefault(int(argument), number)
                 inside = "XX"
@@ -76,4 +76,4 @@ class Memory:
 
 def _can_be_stored(text: str) -> bool:
     printable = text.isascii() and text.isprintable() and " " not in text
-    return printable and 0 < len(text) <= LONGEST
+    return printable and 0 < len(text) <= LONGEST_STORED_LINE

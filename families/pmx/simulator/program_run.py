@@ -20,9 +20,17 @@ from multidrop.families.pmx.manual import program_file, script_compiler
 from multidrop.families.pmx.manual.script_parser import PROGRAMS, VARIABLES
 from multidrop.families.pmx.manual.table import lookup
 from multidrop.families.pmx.simulator.device import PmxDevice
-from multidrop.families.pmx.simulator.programs import Failure
+from multidrop.families.pmx.simulator.programs import ProgramError
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.program_events import BreakPoint, Debugging, Event, Recorder, Summary, Value, Values
+from multidrop.simulator.program_events import (
+    BreakPoint,
+    DebugWishes,
+    ProgramEvent,
+    RunRecorder,
+    Summary,
+    Value,
+    Values,
+)
 from multidrop.simulator.program_run import ProgramRun, Reader
 
 LAST_LINE = 999_999
@@ -31,7 +39,7 @@ _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASC
 
 
 @dataclass
-class Statement:
+class RunningStatement:
     """A statement under way: when it began, its line in the file, what it has changed so far."""
 
     t: float
@@ -39,18 +47,18 @@ class Statement:
     changed: dict[str, Value] = field(default_factory=dict)
 
 
-class Statements(Recorder):
+class Statements(RunRecorder):
     """A statement of the file has several compiled lines, so it is reported when the next one begins."""
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self.under_way: dict[int, Statement] = {}  # by program
+        self.under_way: dict[int, RunningStatement] = {}  # by program
 
     def begin(self, t: float, program: int, line: int) -> bool:
         """A program begins a statement; whether a break point ends the run before it."""
         self.close(program)
         if not self.reaches(t, line):
-            self.under_way[program] = Statement(t, line)
+            self.under_way[program] = RunningStatement(t, line)
             return False
         return True
 
@@ -61,7 +69,7 @@ class Statements(Recorder):
     @property
     def open_since(self) -> float:
         """When the first statement under way began; infinite where there is none."""
-        return min((each.t for each in self.under_way.values()), default=inf)
+        return min((statement.t for statement in self.under_way.values()), default=inf)
 
     def end(self) -> None:
         """Record the statements under way: the run is over."""
@@ -104,18 +112,18 @@ class AScriptRun(ProgramRun):
     def parsed(cls, text: str, file: str) -> Sequence[SourceLine]:
         return program_file.read(text, file)
 
-    def begin(self, start: str, debugging: Debugging) -> None:
+    def begin(self, start: str, debugging: DebugWishes) -> None:
         """Start program 0 or 1, or all."""
         if debugging.wanted:
             self.recorder = self.recording(debugging, Statements)
             self._programs.watch(self._before, self.recorder.executed)
-        there = [each for each in range(PROGRAMS) if self._programs.memory.start_of(each) is not None]
-        chosen = [each for each in there if start in ("", str(each))]
+        there = [program for program in range(PROGRAMS) if self._programs.memory.start_of(program) is not None]
+        chosen = [program for program in there if start in ("", str(program))]
         if not chosen:
-            valid = ", ".join(str(each) for each in there) or "none"
+            valid = ", ".join(str(program) for program in there) or "none"
             raise Diagnostic(f"no program {start}".rstrip(), self.file, f"valid: {valid}")
-        for each in chosen:
-            self._programs.control(each, 1, 0.0)
+        for program in chosen:
+            self._programs.control(program, 1, 0.0)
 
     def deadline(self) -> float | None:
         return self._programs.deadline
@@ -169,37 +177,37 @@ class AScriptRun(ProgramRun):
         if self._device.controller.outputs != self._outputs:
             self._outputs = self._device.controller.outputs
             facts = {"program": program, "outputs": self._outputs}
-            self.events.append(Event(t, facts, f"DO={self._outputs} (program {program})"))
+            self.events.append(ProgramEvent(t, facts, f"DO={self._outputs} (program {program})"))
 
-    def news(self) -> list[Event]:
+    def news(self) -> list[ProgramEvent]:
         """What follows the start of an unfinished statement waits for its end."""
         news, begun = super().news(), inf if self.recorder is None else self.recorder.open_since
-        self.events = [each for each in news if each.t >= begun]
-        return [each for each in news if each.t < begun]
+        self.events = [event for event in news if event.t >= begun]
+        return [event for event in news if event.t < begun]
 
     @staticmethod
-    def order(event: Event) -> tuple[float, bool]:
+    def order(event: ProgramEvent) -> tuple[float, bool]:
         return event.t, event.problem or event.line is None  # an executed line first
 
-    def happened(self) -> Iterator[Event]:
-        for each in self._programs.failures:
-            yield self._failed(each)
-            if not each.handled:
-                self.errors.append(each.why)
+    def happened(self) -> Iterator[ProgramEvent]:
+        for failure in self._programs.failures:
+            yield self._failed(failure)
+            if not failure.handled:
+                self.errors.append(failure.why)
         self._programs.failures.clear()
 
-    def rest(self) -> Iterator[Event]:
+    def rest(self) -> Iterator[ProgramEvent]:
         if self.recorder is not None:
             self.recorder.end()
         yield from self.news()
 
-    def _failed(self, failure: Failure) -> Event:
+    def _failed(self, failure: ProgramError) -> ProgramEvent:
         """An error in a program, its cause, and whether SUB 31 has handled it."""
         line, more = self._lines.get(failure.line, 0), {"handled": True} if failure.handled else {}
         facts = {"program": failure.program, "error": failure.why, "line": line, **more}
         handled = " (SUB 31 has handled it)" if failure.handled else ""
         text = f"program {failure.program} at {failure.t:.4f} s: {failure.why}{handled}"
-        return Event(failure.t, facts, text, line, problem=True)
+        return ProgramEvent(failure.t, facts, text, line, problem=True)
 
     def summary(self, ended: str, until: float | None) -> Summary:
         programs = self._programs

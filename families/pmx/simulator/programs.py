@@ -1,8 +1,9 @@
 """A-SCRIPT programs in the memory of a simulated PMX-2ED-SA, run in virtual time (manual 7.19, 10).
 
-`Programs.advance(now)` is the one loop that lets time pass, for programs and controller. It goes from event to event (a
-program's line, or an event of the controller) and settles the controller at each of these times. So the owner of both
-calls `programs.advance(now)`, and `programs.deadline` is the time of the next event; nothing here calls back into that.
+`PmxInterpreter.advance(now)` is the one loop that lets time pass, for programs and controller. It goes from event to
+event (a program's line, or an event of the controller) and settles the controller at each of these times. So the owner
+of both calls `programs.advance(now)`, and `programs.deadline` is the time of the next event; nothing here calls back
+into that.
 
 The compiled lines are described in docs/pmx-lines.md. Values are 32-bit signed and wrap around; division rounds down
 (7.19.6). A line takes everything off the stack or is a Fault, so lines in an unknown order never run as something else.
@@ -19,32 +20,32 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from multidrop.families.pmx.manual.script_compiler import COMPARISON, LINES, MOVES, OPERANDS, OPERATION
+from multidrop.families.pmx.manual.script_compiler import COMPARISON, MEMORY_LINES, MOVES, OPERANDS, OPERATION
 from multidrop.families.pmx.manual.script_parser import AXES, HANDLER, PROGRAMS, VARIABLES, WORDS
 from multidrop.families.pmx.simulator.commands import CommandedController
-from multidrop.families.pmx.simulator.memory import Memory
+from multidrop.families.pmx.simulator.memory import PmxMemory
 from multidrop.families.pmx.simulator.settings import wrapped
 
-KEPT = 32
+FIRST_KEPT_VARIABLE = 32
 """The first variable that STORE keeps; those below are zero after power-up."""
 MOST_FAILURES = 1000
 STOP, START, PAUSE, CONTINUE = 0, 1, 2, 3
 """Values of SR."""
 IDLE, RUNNING, PAUSED, ERROR = 0, 1, 2, 4
 """Values of SASTAT."""
-DEEPEST = 32
+DEEPEST_CALLS = 32
 """The deepest nesting of calls; the manual does not give a unit's."""
 MASK = 0xFFFFFFFF
 JUMP_TO_FIRST = 1 << 13
 """The bit of POL that starts a program again after SUB 31, instead of repeating the statement that failed."""
 
 
-class Fault(Exception):
+class ProgramFault(Exception):
     """An error that takes a program to SUB 31."""
 
 
 @dataclass(frozen=True)
-class Failure:
+class ProgramError:
     """An error in a program: its time, the program, its line in memory, the cause; whether there was a SUB 31."""
 
     t: float
@@ -85,13 +86,13 @@ _TAKING = frozenset({"CV", "VR", "OX", "AM", "JI", "JW"})
 """Lines that values may precede."""
 
 
-class Thread:
+class PmxThread:
     """One of the two programs: its state, its value stack and its calls.
 
     `due`: when it carries out its next line; None while it waits or does not run.
     """
 
-    def __init__(self, number: int, machine: Programs) -> None:
+    def __init__(self, number: int, machine: PmxInterpreter) -> None:
         self.number, self.machine = number, machine
         self.state = IDLE
         self.at = 0
@@ -126,13 +127,13 @@ class Thread:
         self._start(at, now)
         self._frames.append(_Frame(None))
 
-    def fail(self, fault: Fault, now: float) -> None:
+    def fail(self, fault: ProgramFault, now: float) -> None:
         """Go to SUB 31; end in error if there is none, or if the error is in SUB 31."""
         self.failure, self.failed = f"{fault} at line {self.at}", now
         handler = self.machine.memory.subroutine(HANDLER)
-        if any(each.handler for each in self._frames) or len(self._frames) >= DEEPEST:
+        if any(frame.handler for frame in self._frames) or len(self._frames) >= DEEPEST_CALLS:
             handler = None
-        self.machine.failures.append(Failure(now, self.number, self._begin, str(fault), handler is not None))
+        self.machine.failures.append(ProgramError(now, self.number, self._begin, str(fault), handler is not None))
         if handler is None:
             self.machine.ended(now)
             self.end(ERROR)
@@ -176,14 +177,14 @@ class Thread:
                 self._go(self._called)
                 self._called = None
             self._begin = self.at
-        found = memory.code[self.at] if self.at < len(memory.code) else None
+        compiled = memory.code[self.at] if self.at < len(memory.code) else None
         self.due = now + machine.line_s
         try:
-            if found is None:
+            if compiled is None:
                 held = memory.line(self.at) if self.at < len(memory.code) else "the end of the memory"
-                raise Fault(f"{held!r} cannot be executed")
-            self._carry_out(*found, now)
-        except Fault as fault:
+                raise ProgramFault(f"{held!r} cannot be executed")
+            self._carry_out(*compiled, now)
+        except ProgramFault as fault:
             self.fail(fault, now)
         if self.due is None and not self.waiting:
             machine.ended(now)
@@ -203,10 +204,10 @@ class Thread:
                 source, target = self.take(2)
                 value = self.number_of(source, now)
                 if isinstance(target, int) or (target[0] != "V" and not WORDS[target].settable):
-                    raise Fault(f"{target} cannot be set")
+                    raise ProgramFault(f"{target} cannot be set")
                 self.assign(target, value, now)
             case "JI" | "JW":  # true skips the next line
-                left, right = (self.number_of(each, now) for each in self.take(OPERANDS))
+                left, right = (self.number_of(operand, now) for operand in self.take(OPERANDS))
                 self.at += _COMPARISONS[argument](left, right)
             case "JR" | "JO":
                 self.at += int(argument) - 1
@@ -214,7 +215,7 @@ class Thread:
                 to = self.at - int(argument)
                 back = self.machine.memory.code[to] if to >= OPERANDS else None
                 if back is None or back[0] != "JW":
-                    raise Fault(f"JM-{argument} goes back to no JW")
+                    raise ProgramFault(f"JM-{argument} goes back to no JW")
                 self.at = to - OPERANDS
                 return
             case "EI" | "PS" | "SS":
@@ -229,9 +230,9 @@ class Thread:
             case "GS":
                 at = self.machine.memory.subroutine(int(argument))
                 if at is None:
-                    raise Fault(f"SUB {int(argument)} is not defined")
-                if len(self._frames) >= DEEPEST:
-                    raise Fault(f"more than {DEEPEST} nested calls")
+                    raise ProgramFault(f"SUB {int(argument)} is not defined")
+                if len(self._frames) >= DEEPEST_CALLS:
+                    raise ProgramFault(f"more than {DEEPEST_CALLS} nested calls")
                 self._frames.append(_Frame(self.at + 1))
                 self.at = at
                 return
@@ -251,7 +252,7 @@ class Thread:
             self.take(0)
             self.assign(name[:-1], int(argument), now)
         elif name in MOVES:
-            targets = [self.number_of(each, now) for each in self.take(len(name))]
+            targets = [self.number_of(operand, now) for operand in self.take(len(name))]
             self.moved |= set(name)
             self.ask("".join(f"{axis}{target}" for axis, target in zip(name, targets, strict=True)), now)
         elif WORDS[name].command:
@@ -266,19 +267,19 @@ class Thread:
         """Take right, left and target; `~` has no left."""
         alone = argument == OPERATION["~"]
         *operands, target = self.take(2 if alone else 3)
-        values = [self.number_of(each, now) for each in operands]
+        values = [self.number_of(operand, now) for operand in operands]
         try:
             result = ~values[0] if alone else _OPERATIONS[argument](values[1], values[0])
         except ZeroDivisionError:
-            raise Fault("division by zero") from None
+            raise ProgramFault("division by zero") from None
         if isinstance(target, int) or target[0] != "V":
-            raise Fault(f"OX{argument} cannot set {target}")
+            raise ProgramFault(f"OX{argument} cannot set {target}")
         self.machine.variables[int(target[1:])] = wrapped(result)
 
     def _leave(self, now: float) -> None:
         """Return from a subroutine; from SUB 31 perhaps to the begin of the program."""
         if not self._frames:
-            raise Fault("ENDSUB without a call")
+            raise ProgramFault("ENDSUB without a call")
         frame = self._frames.pop()
         if frame.to is None:
             self.end(IDLE)
@@ -297,7 +298,7 @@ class Thread:
         """Take everything off the stack, which must be so many values. Raises Fault."""
         if len(self.stack) != many:
             held = self.machine.memory.line(self.at)
-            raise Fault(f"{held} takes {many} values, and {len(self.stack)} are there")
+            raise ProgramFault(f"{held} takes {many} values, and {len(self.stack)} are there")
         taken, self.stack = self.stack, []
         return taken
 
@@ -311,13 +312,13 @@ class Thread:
         try:
             return wrapped(int(text))
         except ValueError:
-            raise Fault(f"{value} answers {text}") from None
+            raise ProgramFault(f"{value} answers {text}") from None
 
     def ask(self, text: str, now: float, *, changes: bool = True) -> str:
         """Have the controller carry out an ASCII command. Raises Fault if it refuses."""
         reply = self.machine.ask(self.number, text, now, changes=changes)
         if reply.startswith("?"):
-            raise Fault(f"{text} is answered {reply}")
+            raise ProgramFault(f"{text} is answered {reply}")
         return reply
 
     def assign(self, target: str, value: int, now: float) -> None:
@@ -326,24 +327,24 @@ class Thread:
             self.machine.variables[int(target[1:])] = value
         elif target[:2] == "SR":
             if not self.machine.control(int(target[2:]), value, now):
-                raise Fault(f"{target} takes no {value}")
+                raise ProgramFault(f"{target} takes no {value}")
         else:
             self.moved |= {target[-1]} if target[:4] == "SSPD" else set()
             self.ask(f"{WORDS[target].ascii}={value}", now)
 
 
-class Programs:
+class PmxInterpreter:
     """Memory, variables and both programs. Line times are in seconds."""
 
     def __init__(self, controller: CommandedController, line_s: float = 200e-6) -> None:
-        self.memory = Memory()
+        self.memory = PmxMemory()
         self.variables = [0] * VARIABLES
         self.line_s = line_s
         self.executed = 0
         """Lines carried out so far."""
         self.ended_at = 0.0
         """When a program has last come to its end by itself."""
-        self.failures: deque[Failure] = deque(maxlen=MOST_FAILURES)
+        self.failures: deque[ProgramError] = deque(maxlen=MOST_FAILURES)
         """The last failures; the reader takes them out."""
         self.on_command: Callable[[float, int, str], None] | None = None
         """Called with what programs have the controller do: time, program, ASCII command."""
@@ -352,7 +353,7 @@ class Programs:
         self._controller = controller
         self._changed = False  # a program has done something to the controller
         self._now = 0.0
-        self._threads = [Thread(number, self) for number in range(PROGRAMS)]
+        self._threads = [PmxThread(number, self) for number in range(PROGRAMS)]
         self._troubled = dict.fromkeys(AXES, False)
 
     def watch(
@@ -380,7 +381,7 @@ class Programs:
 
     def counter(self, program: int) -> int:
         """`SPC<program>`: its current line."""
-        return min(self._threads[program].at, LINES - 1)
+        return min(self._threads[program].at, MEMORY_LINES - 1)
 
     def failure(self, program: int) -> str:
         """The cause of the last error of a program, for a person; empty: there was none."""
@@ -396,13 +397,13 @@ class Programs:
 
     def power_up(self, now: float) -> None:
         """Begin without a running program and with V0 to V31 at 0; the owner loads what STORE kept."""
-        self.variables[:KEPT] = [0] * KEPT
-        self._threads = [Thread(number, self) for number in range(PROGRAMS)]
+        self.variables[:FIRST_KEPT_VARIABLE] = [0] * FIRST_KEPT_VARIABLE
+        self._threads = [PmxThread(number, self) for number in range(PROGRAMS)]
         self._troubled = dict.fromkeys(AXES, False)
 
     @property
     def running(self) -> bool:
-        return any(each.state == RUNNING for each in self._threads)
+        return any(thread.state == RUNNING for thread in self._threads)
 
     def ask(self, program: int, text: str, now: float, *, changes: bool) -> str:
         """Have the controller carry out an ASCII command for a program."""
@@ -422,7 +423,7 @@ class Programs:
     @property
     def deadline(self) -> float | None:
         """Time of the next event, of a program or of the controller."""
-        dues = [each.due for each in self._threads if each.due is not None]
+        dues = [thread.due for thread in self._threads if thread.due is not None]
         event = self._controller.deadline
         return min([*dues, event] if event is not None else dues, default=None)
 
@@ -461,12 +462,12 @@ class Programs:
         self._look(now)
         self._now = now
 
-    def _next(self) -> Thread | None:
+    def _next(self) -> PmxThread | None:
         """The program whose line is due first; of two at the same time, the one that has waited longer."""
-        first: Thread | None = None
-        for each in self._threads:
-            if each.due is not None and (first is None or first.due is None or each.due < first.due):
-                first = each
+        first: PmxThread | None = None
+        for thread in self._threads:
+            if thread.due is not None and (first is None or first.due is None or thread.due < first.due):
+                first = thread
         return first
 
     def _look(self, now: float) -> None:
@@ -474,11 +475,11 @@ class Programs:
         for axis in AXES:
             troubled = self._controller.troubled(axis)
             if troubled and not self._troubled[axis]:
-                running = [each for each in self._threads if each.state == RUNNING]
-                for each in [each for each in running if axis in each.moved] or running:
-                    if each.failed != now:  # else the command that led to it has been refused too
-                        each.fail(Fault(f"axis {axis} is in error"), now)
+                running = [thread for thread in self._threads if thread.state == RUNNING]
+                for thread in [each for each in running if axis in each.moved] or running:
+                    if thread.failed != now:  # else the command that led to it has been refused too
+                        thread.fail(ProgramFault(f"axis {axis} is in error"), now)
             self._troubled[axis] = troubled
-        for each in self._threads:
-            if each.waiting and each.state == RUNNING and not self._controller.moving(each.waiting):
-                each.wake(now)
+        for thread in self._threads:
+            if thread.waiting and thread.state == RUNNING and not self._controller.moving(thread.waiting):
+                thread.wake(now)

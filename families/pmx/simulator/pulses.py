@@ -10,16 +10,16 @@ from collections.abc import Callable
 from enum import Enum, IntEnum
 from math import ceil, floor, inf
 
-from multidrop.families.pmx.simulator.settings import INT32, Refusal, Settings, rate, window, wrapped
+from multidrop.families.pmx.simulator.settings import INT32, PmxRefusal, PmxSettings, rate, window, wrapped
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics import LINEAR, TRIANGLE, Pace, Profile, Shape, halt, move, slew
+from multidrop.simulator.kinematics import LINEAR, TRIANGLE, MotionPace, Profile, Shape, halt, move, slew
 from multidrop.simulator.world import TOUCH, Shaft, World
 
 ACCELERATING, DECELERATING, CONSTANT = 1, 2, 4
 PLUS, MINUS, HOME = 16, 32, 64
 PLUS_ERROR, MINUS_ERROR, INDEX, JOYSTICK, TIMED_OUT = 128, 256, 512, 1024, 2048
 """Bits of the motor status (table 7.2)."""
-TURN = 1600.0
+PULSES_A_TURN = 1600.0
 """Motor steps from one index mark to the next: a motor of 1.8 degrees at an eighth of a step (manual 5.1)."""
 
 
@@ -66,8 +66,8 @@ STATES = {
 
 
 def paced(
-    settings: Settings, axis: str, speeds: tuple[float, float], times: tuple[int, int], *, strict: bool = True
-) -> Pace:
+    settings: PmxSettings, axis: str, speeds: tuple[float, float], times: tuple[int, int], *, strict: bool = True
+) -> MotionPace:
     """Work out the pace of an axis from low and high speed, pulses/s, and both acceleration times, ms.
 
     Raises Refusal for a low speed that does not fit the high one; not `strict`: a low speed that fits is used.
@@ -76,21 +76,21 @@ def paced(
     if not strict:
         low = min(low, high)
     elif low > high or low < min(window(high).slowest, high):
-        raise Refusal("?Low speed out of range")
+        raise PmxRefusal("?Low speed out of range")
     up = rate(low, high, times[0])
     down = rate(low, high, times[1]) if settings["EDEC"] else up
     shape = Shape(TRIANGLE if settings["SCV" + axis] else LINEAR)
-    return Pace(low, high, up, down, shape, shape)
+    return MotionPace(low, high, up, down, shape, shape)
 
 
-class Rotor(Shaft):
+class PmxRotor(Shaft):
     """A shaft with an encoder and an index. Positions are physical motor steps from power-up.
 
     Pulses turn it by 1, by -1 where the direction's polarity is turned, by less where the motor slips.
     """
 
     def __init__(self, world: World, spec: WorldSpec) -> None:
-        super().__init__(world, TURN)
+        super().__init__(world, PULSES_A_TURN)
         self.counts_a_step = spec.encoder
         self.decoding = 1
         self._slip = spec.slip
@@ -122,20 +122,20 @@ class Rotor(Shaft):
 
     def at_index(self, t: float) -> bool:
         """Whether the shaft is within half a step of an index mark."""
-        place = (self.position(t) - self._index) % TURN
-        return min(place, TURN - place) <= 0.5
+        place = (self.position(t) - self._index) % PULSES_A_TURN
+        return min(place, PULSES_A_TURN - place) <= 0.5
 
     def next_index(self, after: float) -> float:
         """The time at which the next index mark is passed; infinite: never."""
         direction = self.path.direction(after)
         if not self.path.moving(after) or not direction:
             return inf
-        turns = (self.position(after) - self._index) / TURN
-        mark = self._index + TURN * (floor(turns + TOUCH) + 1 if direction > 0 else ceil(turns - TOUCH) - 1)
+        turns = (self.position(after) - self._index) / PULSES_A_TURN
+        mark = self._index + PULSES_A_TURN * (floor(turns + TOUCH) + 1 if direction > 0 else ceil(turns - TOUCH) - 1)
         return self.path.crossing(mark - self.offset, after)
 
 
-def planned(t: float, here: float, place: float, pace: Pace) -> Profile:
+def planned(t: float, here: float, place: float, pace: MotionPace) -> Profile:
     """Plan a move from rest; where the ramps do not each fit into half of it, the first serves twice (A.2)."""
     longest = (pace.vm**2 - pace.vi**2) / (2 * min(pace.a, pace.d))
     return move(t, here, 0.0, place, pace._replace(d=pace.a) if longest > abs(place - here) / 2 else pace)
@@ -147,11 +147,11 @@ class Pulses:
     `on_change` is called before a new profile replaces the old one.
     """
 
-    def __init__(self, rotor: Rotor) -> None:
+    def __init__(self, rotor: PmxRotor) -> None:
         self.rotor = rotor
         self.doing = Doing.NOTHING
         self.profile: Profile = halt(0.0, 0.0)
-        self.pace = Pace(1.0, 1.0, 1.0, 1.0)
+        self.pace = MotionPace(1.0, 1.0, 1.0, 1.0)
         self.on_change: Callable[[float], None] = lambda t: None
         self._offset = 0.0
 
@@ -183,21 +183,21 @@ class Pulses:
         """The nearest place of a whole count."""
         return round(place + self._offset) - self._offset
 
-    def to_place(self, place: float, t: float, pace: Pace) -> Profile:
+    def to_place(self, place: float, t: float, pace: MotionPace) -> Profile:
         """Plan a motion to a place, from rest or on the fly."""
         if self.profile.velocity(t):
             return self.to_place_on_the_fly(place, t, pace)
         return planned(t, self.profile.position(t), place, pace)
 
-    def to_place_on_the_fly(self, place: float, t: float, pace: Pace) -> Profile:
+    def to_place_on_the_fly(self, place: float, t: float, pace: MotionPace) -> Profile:
         """Plan the rest of a motion to another place, or at another pace."""
         return move(t, self.profile.position(t), self.profile.velocity(t), place, pace)
 
-    def to_speed(self, velocity: float, t: float, pace: Pace) -> Profile:
+    def to_speed(self, velocity: float, t: float, pace: MotionPace) -> Profile:
         """Plan a motion to a velocity; 0 stops."""
         return slew(t, self.profile.position(t), self.profile.velocity(t), velocity, pace)
 
-    def begin(self, doing: Doing, profile: Profile, t: float, pace: Pace) -> None:
+    def begin(self, doing: Doing, profile: Profile, t: float, pace: MotionPace) -> None:
         self.on_change(t)
         self.doing, self.pace = doing, pace
         self._follow(profile, t)

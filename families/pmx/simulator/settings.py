@@ -15,14 +15,14 @@ from multidrop.families.pmx.manual.script_parser import KEPT_VARIABLES
 
 AXES = ("X", "Y")
 INT32 = 2**31
-FASTEST = 6_000_000
+FASTEST_SPEED = 6_000_000
 """Pulses/s, the upper end of the last window."""
 VARIABLES = 64
 SCALE = 1000
 """StepNLoop ratios are kept in thousandths."""
 
 
-class Register(NamedTuple):
+class PmxRegister(NamedTuple):
     """A value that can be read and set: its range, its factory value, and whether STORE keeps it (7.20)."""
 
     low: int
@@ -34,7 +34,7 @@ class Register(NamedTuple):
 
 
 REGISTERS = {
-    row["name"] + axis: Register(
+    row["name"] + axis: PmxRegister(
         int(row["low"]), int(row["high"]), int(row["factory"]), not row["lost"], bool(row["idle"])
     )
     for row in rows(__file__, "registers.csv")
@@ -42,7 +42,7 @@ REGISTERS = {
 }
 
 
-class Window(NamedTuple):
+class SpeedWindow(NamedTuple):
     """A row of table A.0: the speeds from above `low` to `high` pulses/s, its lowest low speed, and its delta."""
 
     low: int
@@ -52,22 +52,22 @@ class Window(NamedTuple):
 
 
 WINDOWS = (
-    Window(0, 16_000, 1, 300),
-    Window(16_000, 32_000, 1, 775),
-    Window(32_000, 80_000, 5, 1900),
-    Window(80_000, 160_000, 10, 3700),
-    Window(160_000, 325_000, 20, 7300),
-    Window(325_000, 815_000, 50, 18_000),
-    Window(815_000, 1_600_000, 100, 38_400),
-    Window(1_600_000, 3_200_000, 200, 68_000),
-    Window(3_200_000, FASTEST, 400, 135_000),
+    SpeedWindow(0, 16_000, 1, 300),
+    SpeedWindow(16_000, 32_000, 1, 775),
+    SpeedWindow(32_000, 80_000, 5, 1900),
+    SpeedWindow(80_000, 160_000, 10, 3700),
+    SpeedWindow(160_000, 325_000, 20, 7300),
+    SpeedWindow(325_000, 815_000, 50, 18_000),
+    SpeedWindow(815_000, 1_600_000, 100, 38_400),
+    SpeedWindow(1_600_000, 3_200_000, 200, 68_000),
+    SpeedWindow(3_200_000, FASTEST_SPEED, 400, 135_000),
 )
 """By SSPDM from 1 on."""
 
 
-def window(speed: float) -> Window:
+def window(speed: float) -> SpeedWindow:
     """Find the window of a high speed, pulses/s; the boundary belongs to the lower window."""
-    return next((each for each in WINDOWS if speed <= each.high), WINDOWS[-1])
+    return next((window for window in WINDOWS if speed <= window.high), WINDOWS[-1])
 
 
 def rate(low: float, high: float, milliseconds: float) -> float:
@@ -76,7 +76,7 @@ def rate(low: float, high: float, milliseconds: float) -> float:
     return max(high - low, 1.0) / (min(max(milliseconds, 1.0), longest) / 1000)
 
 
-class Settings:
+class PmxSettings:
     """The registers of one controller, its name and variables, and the flash that keeps them."""
 
     def __init__(self, number: str) -> None:
@@ -115,5 +115,5 @@ def wrapped(value: float) -> int:
     return (round(value) + INT32) % (2 * INT32) - INT32
 
 
-class Refusal(Exception):
+class PmxRefusal(Exception):
     """A refused command. The text is the reply (table 9.1); empty: `?` and the command."""

@@ -19,7 +19,7 @@ from multidrop.base.errors import Inexpressible
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, Started, StopPiece
 from multidrop.dialects.state import DriveState, Owed
 from multidrop.families.tmcl.manual import commands
-from multidrop.families.tmcl.manual.commands import Call, Command, Move, Search, Status, Version, accepted
+from multidrop.families.tmcl.manual.commands import Command, MoveType, SearchAction, Status, TmclCall, Version, accepted
 from multidrop.families.tmcl.manual.instructions import spelled
 
 LENGTH = 9
@@ -27,7 +27,7 @@ _FIELDS = Struct(">BBBBi")
 _TEXT = frozenset(b"\r\n\t" + bytes(range(0x20, 0x7F)))
 
 
-class Frame(NamedTuple):
+class ReplyFrame(NamedTuple):
     """A reply: addresses of host and module, status, the command that it repeats, and a value."""
 
     host: int
@@ -37,42 +37,42 @@ class Frame(NamedTuple):
     value: int
 
 
-def frame_of(address: int, call: Call) -> bytes:
+def frame_of(address: int, call: TmclCall) -> bytes:
     return _sealed(_FIELDS.pack(address, call.command, call.type, call.motor, call.value))
 
 
-def parse_reply(frame: bytes) -> Frame | None:
+def parse_reply(frame: bytes) -> ReplyFrame | None:
     """The fields of a reply; None where its checksum is wrong."""
-    return Frame(*_FIELDS.unpack(frame[:-1])) if _sealed(frame[:-1]) == frame else None
+    return ReplyFrame(*_FIELDS.unpack(frame[:-1])) if _sealed(frame[:-1]) == frame else None
 
 
-def line_in(frame: bytes) -> Call:
+def line_in(frame: bytes) -> TmclCall:
     """The stored line in the reply to command 134: it has the places of module, status, command and value."""
     _, *fields = _FIELDS.unpack(frame[:-1])
-    return Call(*fields)
+    return TmclCall(*fields)
 
 
-def call_of(frame: bytes) -> tuple[int, Call]:
+def call_of(frame: bytes) -> tuple[int, TmclCall]:
     address, command, kind, motor, value = _FIELDS.unpack(frame[:-1])
-    return address, Call(command, kind, motor, value)
+    return address, TmclCall(command, kind, motor, value)
 
 
 def replies_in(data: bytes) -> tuple[str, ...]:
     """The addresses of modules whose replies are in these bytes, wherever one begins; plain text holds none."""
-    found = {}
+    frames = {}
     for at in range(len(data) - LENGTH + 1):
         fields = parse_reply(data[at : at + LENGTH])
         if fields is None or fields.status not in tuple(Status) or all(byte in _TEXT for byte in data[at : at + 8]):
             continue
         if fields.module and (fields.command in tuple(Command) or not accepted(fields.status)):
-            found[str(fields.module)] = True
-    return tuple(found)
+            frames[str(fields.module)] = True
+    return tuple(frames)
 
 
 def moves(frames: bytes) -> bool:
     """Whether requests can start a motion or a program; a part of one may belong to any."""
     pieces = [frames[at : at + LENGTH] for at in range(0, len(frames), LENGTH)]
-    return any(len(each) < LENGTH or call_of(each)[1].moves for each in pieces)
+    return any(len(piece) < LENGTH or call_of(piece)[1].moves for piece in pieces)
 
 
 def _sealed(body: bytes) -> bytes:
@@ -85,11 +85,11 @@ ADDRESSES = frozenset(str(number) for number in range(1, 256))
 MOST_MOTORS = 6
 """Motors of the largest module; a module whose motors are not counted may have as many."""
 WRONG_CHECKSUM = str(int(Status.WRONG_CHECKSUM))
-GAP = 0.03
+STOP_PIECE_QUIET = 0.03
 """Seconds of quiet after each frame of a stop: its reply must not run into the next frame."""
 RESYNC = 1.0
 """Seconds of silence after which a module has dropped an unfinished message."""
-QUIET = 0.1
+NO_REPLY_QUIET = 0.1
 """Seconds of quiet that end a request without a reply."""
 
 STOP_BYTES = re.compile(rb"[\x01-\xff](?:\x03\x00[\x00-\x05]|\x0d\x01[\x00-\x05]|[\x80\x85]\x00\x00)\x00{4}[\x00-\xff]")
@@ -113,7 +113,7 @@ class Tmcl(Codec):
     spares: ClassVar[bool] = True
     stop_debris: ClassVar[re.Pattern[str]] = re.compile(r"heard .*")
 
-    def request(self, address: str, text: str, call: Call) -> Request:
+    def request(self, address: str, text: str, call: TmclCall) -> Request:
         """The request for a command; `text` is what it means to a person. Raises Inexpressible."""
         kind = Kind.QUIET if call.command == Command.FACTORY else Kind.PRINT if call.prints else Kind.COMMAND
         return Request(address, text, kind, self, body=frame_of(number_of(address), call))
@@ -130,9 +130,9 @@ class Tmcl(Codec):
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """The first reply with the address and the command of the request; None while the count of nine may be lost."""
-        found = self._reply_in(request, buffer)
-        doubtful = found is not None and found.reply.end is End.REFUSED and found.reply.text == WRONG_CHECKSUM
-        return None if doubtful else found
+        decoded = self._reply_in(request, buffer)
+        doubtful = decoded is not None and decoded.reply.end is End.REFUSED and decoded.reply.text == WRONG_CHECKSUM
+        return None if doubtful else decoded
 
     def _reply_in(self, request: Request, buffer: bytes) -> Decoded | None:
         address, call = call_of(request.body)
@@ -173,7 +173,7 @@ class Tmcl(Codec):
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet that end a request without a reply; others are given that long at least."""
-        return (request.settle or QUIET) if request.kind is Kind.QUIET else RESYNC
+        return (request.settle or NO_REPLY_QUIET) if request.kind is Kind.QUIET else RESYNC
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies and reached targets, a line each; replies to a stop give none."""
@@ -204,20 +204,20 @@ class Tmcl(Codec):
         Programs are halted before the motors, which they would start again. One MST for each module goes ahead of that.
         """
         first, whole = self._first(addresses), self._stops(addresses)
-        begun = [StopPiece(each, GAP) for each in (*first[1:], *whole)]
+        begun = [StopPiece(piece, STOP_PIECE_QUIET) for piece in (*first[1:], *whole)]
         again = [*first, *whole] if self.storing else whole
-        return [*begun, StopPiece(again[0], RESYNC), *(StopPiece(each, GAP) for each in again[1:])]
+        return [*begun, StopPiece(again[0], RESYNC), *(StopPiece(piece, STOP_PIECE_QUIET) for piece in again[1:])]
 
     def _first(self, addresses: Sequence[str]) -> list[bytes]:
-        call = Call(Command.END_DOWNLOAD if self.storing else Command.MST)
+        call = TmclCall(Command.END_DOWNLOAD if self.storing else Command.MST)
         return [frame_of(int(name), call) for name in _modules(addresses)]
 
     def _stops(self, addresses: Sequence[str]) -> list[bytes]:
         """The end of each program; MST for the first motor of each module, then for the second; so for the searches."""
         counted, modules = dict(self.motors), _modules(addresses)
-        return [frame_of(int(name), Call(Command.STOP_PROGRAM)) for name in modules] + [
-            frame_of(int(name), Call(command, kind, motor))
-            for command, kind in ((Command.MST, 0), (Command.RFS, Search.STOP))
+        return [frame_of(int(name), TmclCall(Command.STOP_PROGRAM)) for name in modules] + [
+            frame_of(int(name), TmclCall(command, kind, motor))
+            for command, kind in ((Command.MST, 0), (Command.RFS, SearchAction.STOP))
             for motor in range(MOST_MOTORS)
             for name in modules
             if motor < counted.get(name, MOST_MOTORS)
@@ -236,18 +236,20 @@ class Tmcl(Codec):
         call = commands.parsed(text)
         if call is None or call.row is None:
             return Started()
-        together = call.command == Command.MVP and call.type == Move.COORD
+        together = call.command == Command.MVP and call.type == MoveType.COORD
         return Started(None if together else frozenset({str(call.motor)}), program=False, lasts=call.lasts)
 
     def stop_started(self, address: str, started: Started) -> Sequence[StopPiece]:
         """Return MST for each motor that was started, and the end of its search; with a program the usual stop."""
         if started.program or self.storing:
-            return tuple(StopPiece(each, GAP) for each in (*self._first([address]), *self._stops([address])))
+            return tuple(
+                StopPiece(piece, STOP_PIECE_QUIET) for piece in (*self._first([address]), *self._stops([address]))
+            )
         [name] = _modules([address])
         motors = range(dict(self.motors).get(name, MOST_MOTORS))
         return tuple(
-            StopPiece(frame_of(int(name), Call(command, kind, motor)), GAP)
-            for command, kind in ((Command.MST, 0), (Command.RFS, Search.STOP))
+            StopPiece(frame_of(int(name), TmclCall(command, kind, motor)), STOP_PIECE_QUIET)
+            for command, kind in ((Command.MST, 0), (Command.RFS, SearchAction.STOP))
             for motor in motors
             if started.axes is None or str(motor) in started.axes
         )
@@ -261,8 +263,8 @@ class Tmcl(Codec):
 
     def stored_stop(self, line: str) -> str:
         """The address of a module whose reply to a stop was status 101."""
-        found = STORED_STOP.match(line)
-        return found[1] if found else ""
+        match = STORED_STOP.match(line)
+        return match[1] if match else ""
 
 
 def number_of(address: str) -> int:
@@ -276,7 +278,7 @@ def _modules(addresses: Sequence[str]) -> list[str]:
     return [name for name in addresses if name in ADDRESSES] or [FACTORY]
 
 
-def _described(fields: Frame) -> str:
+def _described(fields: ReplyFrame) -> str:
     if fields.command == Command.NOTIFY and fields.status == Status.TARGET_REACHED:
         motors = [str(n) for n in range(8) if fields.value >> n & 1]
         return f"module {fields.module}: target reached, motor {', '.join(motors) or 'not named'}"

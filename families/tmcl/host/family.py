@@ -35,7 +35,7 @@ from multidrop.families.tmcl.host.operations import TmclCertifying, TmclOperatio
 from multidrop.families.tmcl.manual import commands, help
 from multidrop.families.tmcl.manual.commands import Command, Global
 
-FIRST = "0"
+FIRST_AXIS = "0"
 """The first motor."""
 
 
@@ -86,22 +86,22 @@ class TmclFamily(TmclOperations, Family):
         names = tuple(dict.fromkeys(hints.drives or named)) or (FACTORY,)
         for name in names:  # all, before the first is asked
             number_of(name)
-        found: list[TmclState] = []
+        states: list[TmclState] = []
         for name in names:
             state = TmclState(Tmcl(), name)
             state.named(name)
-            if any(each.name == name and not each.lines for each in hints.owed):
+            if any(owed.name == name and not owed.lines for owed in hints.owed):
                 yield from end_download(state, "the last session left it in download mode")
             if not (yield from find(state)):
                 state.note(f"{who(state)} does not reply")
-            found.append(state)
-        count_line(found)
-        for state in found:
+            states.append(state)
+        count_line(states)
+        for state in states:
             yield from repaired(state, hints.owed, TmclOperations(state).perform)
-        if not any(state.product for state in found):
-            tried = ", ".join(state.address for state in found)
+        if not any(state.product for state in states):
+            tried = ", ".join(state.address for state in states)
             raise NoAnswer(f"no module replies at {tried}; drives=1,2,... names others")
-        return [*found]
+        return [*states]
 
     def guard(self, text: str) -> Guard | None:
         line = text.strip()
@@ -131,11 +131,11 @@ class TmclFamily(TmclOperations, Family):
 
     @classmethod
     def move(cls, axis: str, distance: int | str) -> tuple[str, ...]:
-        return (f"MVP REL, {axis or FIRST}, {distance}",)
+        return (f"MVP REL, {axis or FIRST_AXIS}, {distance}",)
 
     @classmethod
     def move_to(cls, axis: str, position: int | str) -> tuple[str, ...]:
-        return (f"MVP ABS, {axis or FIRST}, {position}",)
+        return (f"MVP ABS, {axis or FIRST_AXIS}, {position}",)
 
     @classmethod
     def assign(cls, word: str, value: str) -> str | None:

@@ -31,7 +31,7 @@ from multidrop.dialects.motions import (
 from multidrop.families.tmcl.host.codec import MOST_MOTORS, TmclState
 from multidrop.families.tmcl.host.operations import TmclOperations, motors, read
 from multidrop.families.tmcl.manual import commands
-from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Global, Search
+from multidrop.families.tmcl.manual.commands import AxisParameter, Command, Global, SearchAction, TmclCall
 
 ABSOLUTE, RELATIVE, TOGETHER = 0, 1, 2
 """The types of MVP; the third one, COORD, moves motors to coordinates that are stored in the module."""
@@ -67,7 +67,7 @@ def _axis(state: TmclState, motor: int) -> str:
 def _ticks(state: TmclState) -> Procedure[int | None]:
     """Read the time since power-up, ms, of 32 bits; None for a module without it."""
     try:
-        return (yield from read(state, Call(Command.GGP, Global.TICK_TIMER, 0)))
+        return (yield from read(state, TmclCall(Command.GGP, Global.TICK_TIMER, 0)))
     except Refused:
         return None
 
@@ -82,7 +82,7 @@ def _went_back(state: TmclState, evidence: Evidence) -> Procedure[bool]:
 
 def _flags(state: TmclState, motor: int) -> Procedure[int]:
     try:
-        return (yield from read(state, Call(Command.GAP, Axis.DRIVER_FLAGS, motor)))
+        return (yield from read(state, TmclCall(Command.GAP, AxisParameter.DRIVER_FLAGS, motor)))
     except Refused:  # not every module has them
         return 0
 
@@ -94,7 +94,7 @@ def _short(state: TmclState, ending: Ending, motor: int, way: int, evidence: Evi
         return replace(ending, outcome=Outcome.LIMIT, reason=reason)
     if not evidence.stopped:
         try:
-            flags = yield from _value(state, Axis.ERROR_FLAGS, motor)
+            flags = yield from _value(state, AxisParameter.ERROR_FLAGS, motor)
         except Refused:
             flags = 0
         for bit, (outcome, reason) in REASONS.items():
@@ -109,8 +109,8 @@ def _short(state: TmclState, ending: Ending, motor: int, way: int, evidence: Evi
 def _switch(state: TmclState, motor: int, way: int) -> Procedure[str | None]:
     """The limit switch that stops a motor on this way, in words."""
     for sign, switch, off, name in (
-        (1, Axis.RIGHT_SWITCH, Axis.RIGHT_LIMIT_OFF, "right"),
-        (-1, Axis.LEFT_SWITCH, Axis.LEFT_LIMIT_OFF, "left"),
+        (1, AxisParameter.RIGHT_SWITCH, AxisParameter.RIGHT_LIMIT_OFF, "right"),
+        (-1, AxisParameter.LEFT_SWITCH, AxisParameter.LEFT_LIMIT_OFF, "left"),
     ):
         if way * sign < 0:
             continue
@@ -122,8 +122,8 @@ def _switch(state: TmclState, motor: int, way: int) -> Procedure[str | None]:
     return None
 
 
-def _value(state: TmclState, parameter: Axis, motor: int) -> Procedure[int]:
-    return (yield from read(state, Call(Command.GAP, parameter, motor)))
+def _value(state: TmclState, parameter: AxisParameter, motor: int) -> Procedure[int]:
+    return (yield from read(state, TmclCall(Command.GAP, parameter, motor)))
 
 
 class TmclMotions(Motions):
@@ -152,19 +152,19 @@ class TmclMotions(Motions):
                 named = [n for n in range(MOST_MOTORS) if call.motor >> n & 1] if call.motor & SEVERAL else [call.motor]
                 # Where it ends is read from parameter 0, as after MVP REL.
                 return Effect(tuple(Move(MoveKind.POSITION, _axis(state, each), relative=0) for each in named))
-            case Command.SAP, Axis.TARGET_POSITION:
+            case Command.SAP, AxisParameter.TARGET_POSITION:
                 return _begins(Move(MoveKind.POSITION, axis, target=call.value))
-            case Command.SAP, Axis.TARGET_VELOCITY:
+            case Command.SAP, AxisParameter.TARGET_VELOCITY:
                 return _begins(Move(MoveKind.VELOCITY, axis, endless=True)) if call.value else Effect(ends=only)
-            case Command.SAP | Command.RSAP, Axis.ACTUAL_POSITION | Axis.MICROSTEPS:
+            case Command.SAP | Command.RSAP, AxisParameter.ACTUAL_POSITION | AxisParameter.MICROSTEPS:
                 return Effect(unknown=only)
-            case Command.RFS, Search.START:
+            case Command.RFS, SearchAction.START:
                 return _begins(Move(MoveKind.HOMING, axis))
-            case Command.RFS, Search.STOP:
+            case Command.RFS, SearchAction.STOP:
                 return Effect(ends=only)
             case command, _ if command in STARTS:
                 every = [_axis(state, motor) for motor in range(max(1, state.motors))]
-                return Effect(begins=tuple(Move(MoveKind.PROGRAM, each) for each in every))
+                return Effect(begins=tuple(Move(MoveKind.PROGRAM, program) for program in every))
             case Command.FACTORY, _:
                 return Effect(unknown=frozenset({"", *map(str, range(MOST_MOTORS))}))
         return NOTHING
@@ -172,12 +172,12 @@ class TmclMotions(Motions):
     def signs(self) -> Procedure[Signs]:
         """Read the flags of each motor's driver, 0 for a module without them, and whether its program runs."""
         state = self.state
-        found = {PROGRAM: int((yield from TmclOperations(state).busy()))}
+        signs = {PROGRAM: int((yield from TmclOperations(state).busy()))}
         if (ticks := (yield from _ticks(state))) is not None:
-            found[TICKS] = ticks
+            signs[TICKS] = ticks
         for motor in range((yield from motors(state))):
-            found[f"208_{motor}"] = yield from _flags(state, motor)
-        return found
+            signs[f"208_{motor}"] = yield from _flags(state, motor)
+        return signs
 
     def runs(self, signs: Signs) -> bool:
         """Whether its program runs."""
@@ -187,7 +187,7 @@ class TmclMotions(Motions):
         """Judge the motion of a motor at rest."""
         state = self.state
         motor = int(axis or 0)
-        position = yield from _value(state, Axis.ACTUAL_POSITION, motor)
+        position = yield from _value(state, AxisParameter.ACTUAL_POSITION, motor)
         ending = Ending(Outcome.REACHED, axis, position)
         if (yield from _went_back(state, evidence)):
             return restarted(ending, "its tick timer began again")
@@ -199,12 +199,12 @@ class TmclMotions(Motions):
         if move is None or move.kind is MoveKind.PROGRAM or evidence.program:
             return ending
         if move.kind is MoveKind.HOMING:
-            if (yield from _value(state, Axis.POSITION_REACHED, motor)):
+            if (yield from _value(state, AxisParameter.POSITION_REACHED, motor)):
                 return ending
             return (yield from _short(state, replace(ending, reason="home was not found"), motor, 0, evidence))
         target = move.target
         if target is None and move.relative is not None:  # parameter 127 says from where MVP REL counts
-            target = yield from _value(state, Axis.TARGET_POSITION, motor)
+            target = yield from _value(state, AxisParameter.TARGET_POSITION, motor)
         if target is None:
             if move.endless and not evidence.stopped:
                 return (yield from _short(state, ending, motor, 0, evidence))

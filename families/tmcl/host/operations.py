@@ -26,13 +26,13 @@ from multidrop.families.tmcl.host.codec import (
 from multidrop.families.tmcl.manual import commands
 from multidrop.families.tmcl.manual.commands import (
     REFUSALS,
-    Axis,
-    Call,
+    AxisParameter,
     Command,
     Global,
-    Running,
-    Search,
+    ProgramStatus,
+    SearchAction,
     Status,
+    TmclCall,
     Version,
 )
 from multidrop.families.tmcl.manual.instructions import CONTROL
@@ -43,11 +43,11 @@ from multidrop.families.tmcl.manual.instructions import CONTROL
 # bears.
 
 
-MARKS = (
-    Call(Command.GGP, Global.HOST_ADDRESS),
-    Call(Command.VERSION, Version.BINARY),
-    Call(Command.RFS, Search.STATUS),
-    Call(Command.GAP, Axis.ACTUAL_POSITION),
+SYNC_MARKS = (
+    TmclCall(Command.GGP, Global.HOST_ADDRESS),
+    TmclCall(Command.VERSION, Version.BINARY),
+    TmclCall(Command.RFS, SearchAction.STATUS),
+    TmclCall(Command.GAP, AxisParameter.ACTUAL_POSITION),
 )
 """Reading commands. Each can prove that the replies to all other commands are over."""
 ANY_VALUE = r"-?\d+"
@@ -61,7 +61,7 @@ def status_of(reply: Reply) -> int | None:
     return fields.status if fields is not None else None
 
 
-def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
+def read(state: TmclState, call: TmclCall, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
     """The value of a reading command. Raises Refused or NoAnswer."""
     asked = state.codec.request(state.address, str(call), call)
     reply = yield from TmclExchange(state).answered(replace(asked, priority=priority))
@@ -81,16 +81,16 @@ class TmclExchange(Exchange):
         """
         state = self.state
         lines: list[str] = []
-        if state.lost_commands.issuperset(each.command for each in MARKS):
+        if state.lost_commands.issuperset(each.command for each in SYNC_MARKS):
             for _ in range(2):
-                reply = yield from self._asked(MARKS[0], request.priority)
+                reply = yield from self._asked(SYNC_MARKS[0], request.priority)
                 if reply is None:
                     return None
                 lines += reply.lines[:-1]
-            state.late_again(MARKS[0].command)
+            state.late_again(SYNC_MARKS[0].command)
         own = call_of(request.body)[1].command
         taken = state.lost_commands | ({own} if after else set())
-        call = next((each for each in MARKS if each.command not in taken), MARKS[0])
+        call = next((each for each in SYNC_MARKS if each.command not in taken), SYNC_MARKS[0])
         reply = yield from self._asked(call, request.priority)
         if reply is None or (call.command in taken and reply.doubtful):
             state.reply_lost(call.command)
@@ -131,7 +131,7 @@ class TmclExchange(Exchange):
         """
         state = self.state
         call = call_of(request.body)[1]
-        begins = (call.command, call.type) == (Command.RFS, Search.START)
+        begins = (call.command, call.type) == (Command.RFS, SearchAction.START)
         if begins and call.motor in state.search_modes_unknown:
             raise Refused(
                 f"{who(state)}: SAP 193 for motor {call.motor} was refused or got no reply: '{request.text}' would "
@@ -142,7 +142,7 @@ class TmclExchange(Exchange):
         yield from self.synchronised(request)
         if state.programming:
             raise Refused(f"{who(state)} is in download mode; '{request.text}' was not sent", int(Status.STORED))
-        sets = (call.command, call.type) == (Command.SAP, Axis.SEARCH_MODE)
+        sets = (call.command, call.type) == (Command.SAP, AxisParameter.SEARCH_MODE)
         if sets:
             state.search_mode_sent(call.motor)
         try:
@@ -151,11 +151,11 @@ class TmclExchange(Exchange):
             if request.kind is not Kind.PRINT or call.changed_by_reading:
                 raise
             reply = yield from self._asked_again(request, lost)
-        if sets or (call.command, call.type) == (Command.GAP, Axis.SEARCH_MODE):
+        if sets or (call.command, call.type) == (Command.GAP, AxisParameter.SEARCH_MODE):
             state.search_mode_known(call.motor)
         return reply
 
-    def _asked(self, call: Call, priority: Priority) -> Procedure[Reply | None]:
+    def _asked(self, call: TmclCall, priority: Priority) -> Procedure[Reply | None]:
         """Send a reading command, and gather what comes before its reply; None without a reply."""
         state = self.state
         asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
@@ -181,7 +181,7 @@ class TmclExchange(Exchange):
         except NoAnswer:
             raise NoAnswer(f"{who(state)} does not reply: '{request.text}' only reads, and was sent twice") from None
 
-    def store(self, request: Request, call: Call, by_hand: bool = True) -> Procedure[None]:
+    def store(self, request: Request, call: TmclCall, by_hand: bool = True) -> Procedure[None]:
         """Begin a download, store a line, or end the download; nothing else may go to the module meanwhile."""
         state = self.state
         if not state.programming:
@@ -219,21 +219,21 @@ def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedur
     count = 1
     try:
         while count < MOST_MOTORS:
-            yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, count), priority)
+            yield from read(state, TmclCall(Command.GAP, AxisParameter.ACTUAL_POSITION, count), priority)
             count += 1
     except Refused:
         pass
     state.motors_counted(count)
     try:
         for motor in range(count):
-            call = Call(Command.GAP, Axis.RELATIVE_FROM, motor)
+            call = TmclCall(Command.GAP, AxisParameter.RELATIVE_FROM, motor)
             state.relative_read(motor, (yield from read(state, call, priority)))
     except (Refused, NoAnswer):
         pass
     return count
 
 
-PROGRAM = Call(Command.PROGRAM_STATUS)
+PROGRAM = TmclCall(Command.PROGRAM_STATUS)
 LACKS = (Status.INVALID_COMMAND, Status.WRONG_TYPE, Status.INVALID_VALUE)
 """The statuses of a module that does not know a command or a parameter."""
 
@@ -254,7 +254,7 @@ class TmclOperations(OfDrive):
             yield from TmclExchange(state).store(request, call)
             return ()
         if call.command == Command.FACTORY or (
-            call.command in (Command.SAP, Command.RSAP) and call.type == Axis.RELATIVE_FROM
+            call.command in (Command.SAP, Command.RSAP) and call.type == AxisParameter.RELATIVE_FROM
         ):
             state.relative_forgotten()
         reply = yield from TmclExchange(state).answered(request)
@@ -265,12 +265,12 @@ class TmclOperations(OfDrive):
         """Raise Inexpressible for a line that is wrong in the language."""
         self.parsed(text)
 
-    def parsed(self, text: str) -> tuple[Request, Call]:
+    def parsed(self, text: str) -> tuple[Request, TmclCall]:
         """Build the request for a command. Raises Inexpressible for one that no module gets."""
         state = self.state
         try:
             call = commands.parse(text)
-        except commands.LineError as error:
+        except commands.TmclLineError as error:
             if state.address not in ("", *ADDRESSES):
                 number_of(state.address)  # in `@2GAP 1, 0` the address is what is wrong
             raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
@@ -278,22 +278,22 @@ class TmclOperations(OfDrive):
 
     def motion(self, priority: Priority) -> Procedure[tuple[Motion, ...]]:
         state = self.state
-        found = []
+        motions = []
         count = yield from motors(state, priority)
         for motor in range(count):
-            position = yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor), priority)
-            velocity = yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor), priority)
-            found.append(Motion(position, velocity, str(motor) if count > 1 else ""))
-        return tuple(found)
+            position = yield from read(state, TmclCall(Command.GAP, AxisParameter.ACTUAL_POSITION, motor), priority)
+            velocity = yield from read(state, TmclCall(Command.GAP, AxisParameter.ACTUAL_VELOCITY, motor), priority)
+            motions.append(Motion(position, velocity, str(motor) if count > 1 else ""))
+        return tuple(motions)
 
     def moving(self) -> Procedure[bool]:
         """Whether a motor has a velocity, or searches its reference."""
         state = self.state
         for motor in range((yield from motors(state))):
-            if (yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor))):
+            if (yield from read(state, TmclCall(Command.GAP, AxisParameter.ACTUAL_VELOCITY, motor))):
                 return True
             try:
-                if (yield from read(state, Call(Command.RFS, Search.STATUS, motor))):
+                if (yield from read(state, TmclCall(Command.RFS, SearchAction.STATUS, motor))):
                     return True
             except Refused:  # a module without reference search
                 pass
@@ -301,9 +301,9 @@ class TmclOperations(OfDrive):
 
     def busy(self, priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
         """Whether its program runs; a module that knows neither question has none."""
-        for call in (Call(Command.GGP, Global.PROGRAM_STATUS), PROGRAM):
+        for call in (TmclCall(Command.GGP, Global.PROGRAM_STATUS), PROGRAM):
             try:
-                return mode_of((yield from read(self.state, call, priority))) == Running.RUNS
+                return mode_of((yield from read(self.state, call, priority))) == ProgramStatus.RUNS
             except Refused as refused:
                 if refused.code not in LACKS:
                     raise
@@ -312,8 +312,8 @@ class TmclOperations(OfDrive):
     def referencing(self, text: str) -> Referencing | None:
         if (call := commands.parsed(text)) is None:
             return None
-        searches = call.command == Command.RFS and call.type == Search.START
-        if searches or (call.command == Command.SAP and call.type == Axis.ACTUAL_POSITION):
+        searches = call.command == Command.RFS and call.type == SearchAction.START
+        if searches or (call.command == Command.SAP and call.type == AxisParameter.ACTUAL_POSITION):
             return Referencing(str(call.motor) if self.state.motors > 1 else "", searches)
         return None
 
@@ -323,28 +323,28 @@ class TmclOperations(OfDrive):
         for motor in range((yield from motors(state))):
             parts = []
             for name, parameter in (
-                ("position", Axis.ACTUAL_POSITION),
-                ("target", Axis.TARGET_POSITION),
-                ("velocity", Axis.ACTUAL_VELOCITY),
+                ("position", AxisParameter.ACTUAL_POSITION),
+                ("target", AxisParameter.TARGET_POSITION),
+                ("velocity", AxisParameter.ACTUAL_VELOCITY),
             ):
-                parts.append(f"{name} {(yield from read(state, Call(Command.GAP, parameter, motor)))}")
+                parts.append(f"{name} {(yield from read(state, TmclCall(Command.GAP, parameter, motor)))}")
             for name, parameter in (
-                ("left", Axis.LEFT_SWITCH),
-                ("right", Axis.RIGHT_SWITCH),
-                ("home", Axis.HOME_SWITCH),
+                ("left", AxisParameter.LEFT_SWITCH),
+                ("right", AxisParameter.RIGHT_SWITCH),
+                ("home", AxisParameter.HOME_SWITCH),
             ):
                 try:
-                    closed = yield from read(state, Call(Command.GAP, parameter, motor))
+                    closed = yield from read(state, TmclCall(Command.GAP, parameter, motor))
                 except Refused:  # not every module has each switch
                     continue
                 parts.append(f"{name} switch {'on' if closed else 'off'}")
             lines.append(f"motor {motor}: {', '.join(parts)}")
         return tuple(lines)
 
-    def _remark(self, call: Call) -> None:
+    def _remark(self, call: TmclCall) -> None:
         """Tell a person that the module is reached in another way from now on; follow it to its new address."""
         state = self.state
-        if call.command == Command.SAP and call.type == Axis.RELATIVE_FROM:
+        if call.command == Command.SAP and call.type == AxisParameter.RELATIVE_FROM:
             state.relative_read(call.motor, call.value)
         if call.command == Command.FACTORY:
             state.remark(
@@ -360,12 +360,12 @@ class TmclOperations(OfDrive):
 
 def mode_of(value: int) -> int:
     """What a program does, in the reply to command 135: all of it, or its upper byte; and in global parameter 128."""
-    return value if value in tuple(Running) else value >> 24 & 0xFF
+    return value if value in tuple(ProgramStatus) else value >> 24 & 0xFF
 
 
-TRIES = 2
+SYNC_TRIES = 2
 """The first request may complete an unfinished message in a module."""
-IDENTITY = Call(Command.VERSION, Version.BINARY)
+IDENTITY = TmclCall(Command.VERSION, Version.BINARY)
 
 
 def count_line(states: list[TmclState]) -> None:
@@ -377,7 +377,7 @@ def count_line(states: list[TmclState]) -> None:
 
 def find(state: TmclState) -> Procedure[bool]:
     """Ask one module for its version and count its motors; whether it replied."""
-    for _ in range(TRIES):
+    for _ in range(SYNC_TRIES):
         reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
         damaged = reply.end is End.REFUSED and int(reply.text) == Status.WRONG_CHECKSUM
         if reply.end in (End.DONE, End.REFUSED) and not damaged:
@@ -390,7 +390,7 @@ def find(state: TmclState) -> Procedure[bool]:
     else:
         state.identified("TMCL module", "")
     reply = yield state.codec.request(state.address, "135 0, 0, 0", PROGRAM)
-    if reply.end is End.DONE and mode_of(int(reply.text)) == Running.STORES:
+    if reply.end is End.DONE and mode_of(int(reply.text)) == ProgramStatus.STORES:
         yield from end_download(state, "found in download mode")
     try:
         yield from motors(state)
@@ -406,7 +406,7 @@ def find(state: TmclState) -> Procedure[bool]:
 
 
 def end_download(state: TmclState, why: str) -> Procedure[None]:
-    yield state.codec.request(state.address, END, Call(Command.END_DOWNLOAD))
+    yield state.codec.request(state.address, END, TmclCall(Command.END_DOWNLOAD))
     state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
 
 

@@ -29,30 +29,30 @@ from multidrop.families.tmcl.host.operations import (
     read,
 )
 from multidrop.families.tmcl.manual import program_file
-from multidrop.families.tmcl.manual.commands import Call, Command, Global, parameter
-from multidrop.families.tmcl.manual.instructions import EMPTY, MEMORY, Word, spelled
+from multidrop.families.tmcl.manual.commands import Command, Global, TmclCall, parameter
+from multidrop.families.tmcl.manual.instructions import EMPTY, MEMORY, ProgramWord, spelled
 
 ERASED = 255
 """The number of a line in memory that was never written, in some modules."""
 BLANK = 64
 """Empty lines in a row after which the memory is taken for empty: routines may begin at several addresses."""
-OVER = Call(EMPTY)
+OVER = TmclCall(EMPTY)
 
 
-def read_line(state: TmclState, at: int) -> Procedure[Call]:
+def read_line(state: TmclState, at: int) -> Procedure[TmclCall]:
     """Read one line of the memory. Raises Refused or NoAnswer."""
-    request = state.codec.request(state.address, f"134 0, 0, {at}", Call(Command.READ_PROGRAM, value=at))
+    request = state.codec.request(state.address, f"134 0, 0, {at}", TmclCall(Command.READ_PROGRAM, value=at))
     reply = yield from TmclExchange(state).answered(request)
     fields = parse_reply(reply.body)
     if fields is not None and (fields.module, fields.command) == (call_of(request.body)[0], Command.READ_PROGRAM):
         raise Refused(f"{who(state)} reads no line of its program to a host")
-    found = line_in(reply.body)
-    return OVER if found.command in (EMPTY, ERASED) else found
+    call = line_in(reply.body)
+    return OVER if call.command in (EMPTY, ERASED) else call
 
 
-def read_memory(state: TmclState, last: int, progress: Progress) -> Procedure[Mapping[int, Call]]:
+def read_memory(state: TmclState, last: int, progress: Progress) -> Procedure[Mapping[int, TmclCall]]:
     """Read the stored lines, at least up to address `last`."""
-    found: dict[int, Call] = {}
+    memory: dict[int, TmclCall] = {}
     blank = at = 0
     while at < MEMORY and (blank < BLANK or at <= last):
         progress(at, min(max(at + BLANK - blank, last + 1), MEMORY))
@@ -65,29 +65,29 @@ def read_memory(state: TmclState, last: int, progress: Progress) -> Procedure[Ma
         if call.command == EMPTY:
             blank += 1
         else:
-            blank, found[at] = 0, call
+            blank, memory[at] = 0, call
         at += 1
-    return found
+    return memory
 
 
-def held_of(memory: Mapping[int, Call]) -> Held:
+def held_of(memory: Mapping[int, TmclCall]) -> Held:
     return Held(tuple(Stored(at, spelled(call)) for at, call in sorted(memory.items())))
 
 
-def calls_of(held: Held) -> dict[int, Call]:
+def calls_of(held: Held) -> dict[int, TmclCall]:
     """The lines of the memory that `held_of` wrote."""
     made = program_file.assembled(numbered([line.text for line in held.lines]))
     return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
 
 
-def _line(state: TmclState, call: Call) -> tuple[Any, Call]:
+def _line(state: TmclState, call: TmclCall) -> tuple[Any, TmclCall]:
     return state.codec.request(state.address, spelled(call), call), call
 
 
 def _leave(state: TmclState) -> Procedure[None]:
     """End a download that failed; a failure of this is noted, for the download's own is the one to raise."""
     try:
-        yield from TmclExchange(state).store(*_line(state, Call(Command.END_DOWNLOAD)))
+        yield from TmclExchange(state).store(*_line(state, TmclCall(Command.END_DOWNLOAD)))
     except DriveError as error:
         state.note(str(error))
 
@@ -172,10 +172,10 @@ class TmclPrograms(Programs):
             return lines
         if (yield from TmclOperations(state).busy()):
             raise Refused(f"{who(state)}: its program runs; 128 0, 0, 0 ends it (nothing was sent)")
-        sent = [(each.source, each.call) for each in stored] + [(0, OVER)] * (len(stored) < MEMORY)
+        sent = [(line.source, line.call) for line in stored] + [(0, OVER)] * (len(stored) < MEMORY)
         done, fate = 0, "cut off"
         try:
-            yield from TmclExchange(state).store(*_line(state, Call(Command.DOWNLOAD)), by_hand=False)
+            yield from TmclExchange(state).store(*_line(state, TmclCall(Command.DOWNLOAD)), by_hand=False)
             for source, call in sent:
                 progress(done, len(stored))
                 try:
@@ -184,7 +184,7 @@ class TmclPrograms(Programs):
                     error.args = (f"line {source}: {error}" if source else str(error),)
                     raise
                 done += bool(source)
-            yield from TmclExchange(state).store(*_line(state, Call(Command.END_DOWNLOAD)))
+            yield from TmclExchange(state).store(*_line(state, TmclCall(Command.END_DOWNLOAD)))
             fate = "done"
         except DriveError as error:
             fate = "cut off" if isinstance(error, Stopped) else "told"  # the caller of a stopped one may have gone
@@ -206,14 +206,14 @@ class TmclPrograms(Programs):
     def differences(self, lines: Sequence[SourceLine], held: Held, before: Held | None = None) -> Sequence[Difference]:
         """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
         stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
-        found = [
-            Difference(each.source, text, each.at, there.get(each.at, spelled(OVER)))
-            for each in stored
-            if (text := spelled(each.call)) != there.get(each.at, spelled(OVER))
+        differences = [
+            Difference(line.source, text, line.at, there.get(line.at, spelled(OVER)))
+            for line in stored
+            if (text := spelled(line.call)) != there.get(line.at, spelled(OVER))
         ]
         if stored and (more := there.get(len(stored))) is not None:
-            found.append(Difference(0, "", len(stored), more))
-        return tuple(found)
+            differences.append(Difference(0, "", len(stored), more))
+        return tuple(differences)
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         made = program_file.assembled(lines)
@@ -228,7 +228,7 @@ class TmclPrograms(Programs):
         """The lines of a file, each with its address where it gives a line of the memory."""
         lines = lines_of_text(text)
         made = program_file.assembled(numbered(lines))
-        places = {each.source: each.at for each in made.lines}
+        places = {line.source: line.at for line in made.lines}
         width = len(str(len(made.lines)))
         return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
 
@@ -242,29 +242,29 @@ NO_BREAK = "TMCL has no break points: /break now halts a program; program test -
 
 def address_of(place: str) -> int:
     """The address that a place names. Raises Diagnostic."""
-    found = whole(place or "0", 0, MEMORY - 1)
-    if found is None:
+    address = whole(place or "0", 0, MEMORY - 1)
+    if address is None:
         raise Diagnostic(f"no line {place}", "", f"valid: an address, 0 to {MEMORY - 1}; /list shows them")
-    return found
+    return address
 
 
 def counter(state: TmclState) -> Procedure[int | None]:
     """The address of the next line; None where the module does not tell."""
     try:
-        return (yield from read(state, Call(Command.GGP, Global.PROGRAM_COUNTER)))
+        return (yield from read(state, TmclCall(Command.GGP, Global.PROGRAM_COUNTER)))
     except Refused as refused:
         if refused.code in LACKS:
             return None
         raise
 
 
-def watched_call(name: str) -> Call:
+def watched_call(name: str) -> TmclCall:
     """The command that reads a watched name: `A`, `X`, a user variable `V5`, or an axis parameter `AP1`, `AP1/2`."""
     registers = {"A": 2, "X": 3}
     if name in registers:
-        return Call(Command.PROGRAM_STATUS, registers[name])
-    if name.startswith("V") and (found := whole(name[1:], 0, 255)) is not None:
-        return Call(Command.GGP, found, 2)
+        return TmclCall(Command.PROGRAM_STATUS, registers[name])
+    if name.startswith("V") and (number := whole(name[1:], 0, 255)) is not None:
+        return TmclCall(Command.GGP, number, 2)
     if (call := parameter(name)) is not None:
         if call.changed_by_reading:
             raise Diagnostic(f"{name} cannot be watched: reading it clears it", "", f"{call} reads it once")
@@ -320,7 +320,7 @@ class TmclDebugging(Debugging):
             raise Inexpressible(f"{who(state)} {NO_PLACE}; nothing was sent")
         row = next((each for each in rows if each.at == at), Stored(at, ""))
         yield from TmclOperations(state).perform("130 0, 0, 0")
-        state.program_halted(bool(row.text) and row.text != Word.STOP.name)
+        state.program_halted(bool(row.text) and row.text != ProgramWord.STOP.name)
         return Stepped(row)
 
     def go_on(self, place: str) -> Procedure[None]:
@@ -345,11 +345,11 @@ class TmclDebugging(Debugging):
             watched_call(name)
 
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-        found = {}
+        values = {}
         for name in names:
             try:
-                found[name] = str((yield from read(self.state, watched_call(name))))
+                values[name] = str((yield from read(self.state, watched_call(name))))
             except Refused as refused:
                 if refused.code not in LACKS:
                     raise
-        return found
+        return values

@@ -17,15 +17,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from multidrop.dialects.codec import Kind, Procedure, StopPiece
-from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
-from multidrop.families.tmcl.host.codec import FACTORY, GAP, RESYNC, Tmcl, TmclState, frame_of, replies_in
+from multidrop.dialects.scanning import Found, Reach, Scan, SearchOutcome, Step
+from multidrop.families.tmcl.host.codec import FACTORY, RESYNC, STOP_PIECE_QUIET, Tmcl, TmclState, frame_of, replies_in
 from multidrop.families.tmcl.host.operations import IDENTITY, count_line, find
-from multidrop.families.tmcl.manual.commands import Call, Command
+from multidrop.families.tmcl.manual.commands import Command, TmclCall
 
 ALL = (FACTORY, *(str(number) for number in range(2, 256)))
-SLOWEST = 0.3
+LONGEST_REPLY_WAIT = 0.3
 """The longest pause of a module before a reply (global parameter 75), and its reply, s."""
-LATE = 5
+LATE_ADDRESSES = 5
 """Addresses before the present one whose reply may have run into its question."""
 BLOCK = 32
 """Addresses after which the count is checked."""
@@ -36,7 +36,7 @@ HAZARD = (
 
 
 @dataclass
-class _Search:
+class _TmclSearch:
     """One search of a line."""
 
     reach: Reach
@@ -50,21 +50,23 @@ class _Search:
 
     @property
     def window(self) -> float:
-        return self.reach.window + GAP
+        return self.reach.window + STOP_PIECE_QUIET
 
     def ask(self, address: str) -> Procedure[None]:
         """Ask one address, and identify what replies."""
         first = address == FACTORY and address not in self.asked
         self.reach.asks(address)
         self.asked[address] = None
-        heard = yield from _heard(address, RESYNC if first else SLOWEST if address == ALL[-1] else self.window)
+        heard = yield from _heard(
+            address, RESYNC if first else LONGEST_REPLY_WAIT if address == ALL[-1] else self.window
+        )
         if first and not replies_in(heard):
             heard += yield from _heard(address, RESYNC)
         if heard and not replies_in(heard):
-            for each in [*self.asked][-LATE:]:
-                if each not in self.again and each not in self.states:
-                    self.again.add(each)
-                    heard += yield from _heard(each, SLOWEST)
+            for late in [*self.asked][-LATE_ADDRESSES:]:
+                if late not in self.again and late not in self.states:
+                    self.again.add(late)
+                    heard += yield from _heard(late, LONGEST_REPLY_WAIT)
             if not replies_in(heard):
                 self.unread[address] = None
         for name in replies_in(heard):
@@ -88,7 +90,7 @@ class _Search:
     def counted(self) -> Procedure[bool]:
         """Whether a module that has replied does so again: no byte was lost on the way to it."""
         known = next(reversed(self.states), "")
-        return bool(known and replies_in((yield from _heard(known, SLOWEST))))
+        return bool(known and replies_in((yield from _heard(known, LONGEST_REPLY_WAIT))))
 
 
 def _addresses(reach: Reach) -> Sequence[str]:
@@ -113,9 +115,9 @@ class TmclScan(Scan):
     def places(self, reach: Reach) -> int:
         return len(_addresses(reach))
 
-    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[SearchOutcome]:
         """Search for modules; report each as soon as it is identified, with the number of its motors."""
-        own, addresses = _Search(reach, found), _addresses(reach)
+        own, addresses = _TmclSearch(reach, found), _addresses(reach)
         for begin in range(0, len(addresses), BLOCK):
             block = addresses[begin : begin + BLOCK]
             for address in block:
@@ -132,7 +134,7 @@ class TmclScan(Scan):
         if own.unread:
             why = "is no module's reply: several may reply at once, or drives of another kind"
             own.remarks.append(f"what came at {', '.join(own.unread)} {why}")
-        return Outcome(tuple(own.remarks))
+        return SearchOutcome(tuple(own.remarks))
 
     def asked(self, reach: Reach) -> str:
         return "addresses 1 to 255" if len(_addresses(reach)) > 1 else "address 1 only (--all: each address)"
@@ -142,9 +144,9 @@ class TmclScan(Scan):
 
         The whole stop of an absent module would take half a second.
         """
-        frames = [frame_of(int(address), Call(Command.MST)) for address in asked]
-        pieces = [StopPiece(each, GAP) for each in frames]
-        return [*pieces, *(StopPiece(each, GAP if at else RESYNC) for at, each in enumerate(frames))]
+        frames = [frame_of(int(address), TmclCall(Command.MST)) for address in asked]
+        pieces = [StopPiece(frame, STOP_PIECE_QUIET) for frame in frames]
+        return [*pieces, *(StopPiece(frame, STOP_PIECE_QUIET if at else RESYNC) for at, frame in enumerate(frames))]
 
 
 SCAN = TmclScan()

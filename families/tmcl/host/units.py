@@ -17,7 +17,7 @@ from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
 from multidrop.families.tmcl.host.codec import TmclState, call_of
 from multidrop.families.tmcl.host.operations import read
 from multidrop.families.tmcl.manual import commands
-from multidrop.families.tmcl.manual.commands import Axis, Call, Command
+from multidrop.families.tmcl.manual.commands import AxisParameter, Command, TmclCall
 from multidrop.families.tmcl.manual.modules import module_of
 from multidrop.families.tmcl.manual.parameters import AXIS, MEASURED, SCALES
 
@@ -44,36 +44,36 @@ class TmclUnits(Units):
         return [str(motor) for motor in range(self.state.motors)] if self.state.motors > 1 else [""]
 
     def fields(self, text: str) -> Sequence[Field]:
-        found = _LINE.fullmatch(text)
-        if found is None:
+        match = _LINE.fullmatch(text)
+        if match is None:
             return ()
-        if found[1]:
+        if match[1]:
             takes: Takes | None = Takes.VELOCITY
-        elif found[2]:
-            takes = Takes.PLACE if found[3].upper() == "ABS" else Takes.DISTANCE
+        elif match[2]:
+            takes = Takes.PLACE if match[3].upper() == "ABS" else Takes.DISTANCE
         else:
-            takes = MEASURED.get(int(found[5]))
-        moves = bool(found[2]) or (found[5] is not None and int(found[5]) == Axis.TARGET_POSITION)
-        return (Field(_axis(self.state, int(found[6])), takes, *found.span(7), moves),) if takes is not None else ()
+            takes = MEASURED.get(int(match[5]))
+        moves = bool(match[2]) or (match[5] is not None and int(match[5]) == AxisParameter.TARGET_POSITION)
+        return (Field(_axis(self.state, int(match[6])), takes, *match.span(7), moves),) if takes is not None else ()
 
     def basis(self, axis: str, full_steps: int | None) -> Procedure[Basis]:
         motor, settings = int(axis or 0), {}
         for parameter in SCALES:
-            if parameter == Axis.MICROSTEPS or parameter in module_of(self.state.product).axis:
+            if parameter == AxisParameter.MICROSTEPS or parameter in module_of(self.state.product).axis:
                 try:
-                    settings[int(parameter)] = yield from read(self.state, Call(Command.GAP, parameter, motor))
+                    settings[int(parameter)] = yield from read(self.state, TmclCall(Command.GAP, parameter, motor))
                 except Refused:  # a module without it has no such divisor
                     continue
         named = tuple((f"{number}", str(value)) for number, value in settings.items())
-        if Axis.MICROSTEPS not in settings:
+        if AxisParameter.MICROSTEPS not in settings:
             return Basis(named, missing="the module does not report its microsteps (140)")
-        turn = Fraction((full_steps or FULL_STEPS) * 2 ** settings[Axis.MICROSTEPS])
+        turn = Fraction((full_steps or FULL_STEPS) * 2 ** settings[AxisParameter.MICROSTEPS])
         assumed = "" if full_steps else f"{FULL_STEPS} full steps a turn are assumed"
-        if not settings.get(Axis.UNIT_MODE, 1):
+        if not settings.get(AxisParameter.UNIT_MODE, 1):
             return Basis(named, turn, None, None, assumed)
         if not module_of(self.state.product).chip_units:
             return Basis(named, turn, assumed=assumed)
-        pulse, ramp = settings.get(Axis.PULSE_DIVISOR), settings.get(Axis.RAMP_DIVISOR)
+        pulse, ramp = settings.get(AxisParameter.PULSE_DIVISOR), settings.get(AxisParameter.RAMP_DIVISOR)
         if pulse is None or ramp is None:
             return Basis(named, turn, None, None, assumed)
         speed = Fraction(2**pulse * 2048 * 32, CLOCK)
@@ -85,7 +85,7 @@ class TmclUnits(Units):
             return ()
         if call.command == Command.FACTORY:
             return self.axes()
-        sets = call.command in (Command.SAP, Command.RSAP) and call.type in (Axis.ACTUAL_POSITION, *SCALES)
+        sets = call.command in (Command.SAP, Command.RSAP) and call.type in (AxisParameter.ACTUAL_POSITION, *SCALES)
         return (_axis(self.state, call.motor),) if sets else ()
 
     def recounts(self, request: Request) -> bool:
@@ -100,9 +100,9 @@ class TmclUnits(Units):
         return (_axis(self.state, call.motor), MEASURED[call.type]) if call is not None and known else None
 
     def setting(self, name: str) -> tuple[str, Takes] | None:
-        found = _SETTING.fullmatch(name)
-        takes = MEASURED.get(int(found[1])) if found is not None else None
-        return (_axis(self.state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
+        match = _SETTING.fullmatch(name)
+        takes = MEASURED.get(int(match[1])) if match is not None else None
+        return (_axis(self.state, int(match[2] or 0)), takes) if match is not None and takes is not None else None
 
     def setting_name(self, axis: str, name: str) -> str:
         return commands.setting_name(f"{name}_{axis}" if axis else name)

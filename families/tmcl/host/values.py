@@ -39,15 +39,15 @@ from multidrop.families.tmcl.host.motions import DRIVER_FAULTS
 from multidrop.families.tmcl.host.operations import TmclOperations, motors, read
 from multidrop.families.tmcl.host.programs import TmclPrograms
 from multidrop.families.tmcl.manual.commands import (
-    Axis,
-    Call,
+    AxisParameter,
     Command,
     Global,
+    TmclCall,
     parameter,
     setting_name,
 )
 from multidrop.families.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, module_of
-from multidrop.families.tmcl.manual.parameters import Parameter, Starts, row_of
+from multidrop.families.tmcl.manual.parameters import Starts, TmclParameter, row_of
 
 GLOBAL_PREFIX = "G"
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
@@ -62,42 +62,42 @@ def setting_names(module: Module, motors: int) -> tuple[str, ...]:
     return (*own, *(f"{GLOBAL_PREFIX}{number}" for number in _ordered(module.banks[0])))
 
 
-def _ordered(table: Mapping[int, Parameter]) -> list[int]:
+def _ordered(table: Mapping[int, TmclParameter]) -> list[int]:
     """The settings of a table by their numbers, in the order in which they are written."""
     return sorted((number for number, each in table.items() if each.setting), key=lambda number: table[number].restored)
 
 
-def _row(module: Module, name: str) -> Parameter:
+def _row(module: Module, name: str) -> TmclParameter:
     of_module, number, _ = _parts(name)
     return (module.banks[0] if of_module else module.axis)[number]
 
 
-def _fact(name: str) -> Parameter | None:
+def _fact(name: str) -> TmclParameter | None:
     """A row with the facts of a parameter that every module shares; None: there is no such parameter."""
     of_module, number, _ = _parts(name)
     return row_of(number, of_module)
 
 
-def _call(name: str, command: Command, value: int = 0) -> Call:
+def _call(name: str, command: Command, value: int = 0) -> TmclCall:
     """The command for a setting; `command` is the one for an axis parameter."""
     of_module, number, motor = _parts(name)
     if of_module:
         command = {Command.GAP: Command.GGP, Command.SAP: Command.SGP}[command]
-    return Call(command, number, motor, value)
+    return TmclCall(command, number, motor, value)
 
 
 def reading(name: str, value: int, module: Module) -> Reading:
     of_module, number, _ = _parts(name)
     row = _row(module, name)
-    unit = ", ".join(each for each in (row.title, row.unit) if each)
+    unit = ", ".join(part for part in (row.title, row.unit) if part)
     default = row.fresh if row.known else None
     return Reading(name, value, unit=unit, default=default, fixed=row.wire)
 
 
 def _parts(name: str) -> tuple[bool, int, int]:
     """Divide a name: whether it is a global parameter, the number, the motor."""
-    found = parameter(name)
-    return (found.command == Command.GGP, found.type, found.motor) if found is not None else (False, -1, 0)
+    asked = parameter(name)
+    return (asked.command == Command.GGP, asked.type, asked.motor) if asked is not None else (False, -1, 0)
 
 
 class TmclParameters(ListedParameters):
@@ -146,7 +146,7 @@ class TmclParameters(ListedParameters):
         return str(_call(name, Command.SAP, int(number(value))))
 
     def rescales(self, name: str) -> bool:
-        return _parts(name)[:2] == (False, Axis.MICROSTEPS)
+        return _parts(name)[:2] == (False, AxisParameter.MICROSTEPS)
 
     def ready(self) -> Procedure[str]:
         return f"{who(self.state)} moves: stop it first" if (yield from TmclOperations(self.state).moving()) else ""
@@ -168,11 +168,15 @@ class TmclParameters(ListedParameters):
         return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
 
 
-STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
-FLAGS = Axis.DRIVER_FLAGS
-SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))
-RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
-SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
+STATE = (AxisParameter.TARGET_POSITION, AxisParameter.POSITION_REACHED)
+FLAGS = AxisParameter.DRIVER_FLAGS
+SWITCHES = (
+    (AxisParameter.HOME_SWITCH, "home"),
+    (AxisParameter.RIGHT_SWITCH, "lim+"),
+    (AxisParameter.LEFT_SWITCH, "lim-"),
+)
+RAMP = (AxisParameter.MAXIMUM_VELOCITY, AxisParameter.MAXIMUM_ACCELERATION)
+SETTINGS = (AxisParameter.RUN_CURRENT, AxisParameter.STANDBY_CURRENT, AxisParameter.FREEWHEELING, *RAMP)
 KNOWN = (*STATE, FLAGS, *(axis for axis, _ in SWITCHES), *SETTINGS)
 RUNS = "RUNS"
 """Whether the module's program runs."""
@@ -181,7 +185,7 @@ ABSENT = "absent"
 FULL_CURRENT = 255
 
 
-def _key(axis: Axis, motor: int) -> str:
+def _key(axis: AxisParameter, motor: int) -> str:
     return f"{axis.name} {motor}"
 
 
@@ -194,23 +198,23 @@ def _program(state: TmclState) -> Procedure[Facts]:
     return {RUNS: int((yield from TmclOperations(state).busy(Priority.POLL)))}
 
 
-def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedure[Facts]:
-    found: dict[str, int | str] = {}
+def _parameters(state: TmclState, motor: int, wanted: Sequence[AxisParameter]) -> Procedure[Facts]:
+    values: dict[str, int | str] = {}
     for axis in wanted:
         try:
-            found[_key(axis, motor)] = yield from read(state, Call(Command.GAP, axis, motor), Priority.POLL)
+            values[_key(axis, motor)] = yield from read(state, TmclCall(Command.GAP, axis, motor), Priority.POLL)
         except Refused:
-            found[_key(axis, motor)] = ABSENT
-    return found
+            values[_key(axis, motor)] = ABSENT
+    return values
 
 
 def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     """The conditions of a motor: one ramp up and down. Older modules count it and velocities in units of their chip."""
     values = {axis: value for axis in KNOWN if isinstance(value := facts.get(_key(axis, motor)), int)}
-    run, hold = values.get(Axis.RUN_CURRENT), values.get(Axis.STANDBY_CURRENT)
+    run, hold = values.get(AxisParameter.RUN_CURRENT), values.get(AxisParameter.STANDBY_CURRENT)
     speed, ramp = (values.get(axis) for axis in RAMP)
     chip = module_of(state.product).chip_units
-    freewheels = "freewheels: parameter 204" if values.get(Axis.FREEWHEELING) else ""
+    freewheels = "freewheels: parameter 204" if values.get(AxisParameter.FREEWHEELING) else ""
     faults = ", ".join(words for bit, words in DRIVER_FAULTS.items() if values.get(FLAGS, 0) & bit)
     return Conditions(
         axis=str(motor) if state.motors > 1 else "",
@@ -220,7 +224,7 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
         cause=faults,
         program="running" if facts.get(RUNS) else "",
         runs=bool(facts[RUNS]) if RUNS in facts else None,
-        target=None if values.get(Axis.POSITION_REACHED) else values.get(Axis.TARGET_POSITION),
+        target=None if values.get(AxisParameter.POSITION_REACHED) else values.get(AxisParameter.TARGET_POSITION),
         run_current=None if run is None else round(run * 100 / FULL_CURRENT),
         hold_current=None if hold is None else round(hold * 100 / FULL_CURRENT),
         released="parameter 7 is 0" if hold == 0 else freewheels,
@@ -248,14 +252,14 @@ class TmclActions(Actions):
 
     def word(self, word: str, axis: str) -> str:
         """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
-        found = parameter(word)
-        if found is None:
+        asked = parameter(word)
+        if asked is None:
             return word
         named = re.search(r"[_/]\d$", word) is not None
         return (
-            f"G{found.type}"
-            if found.command == Command.GGP
-            else f"AP{found.type}_{found.motor if named else axis or 0}"
+            f"G{asked.type}"
+            if asked.command == Command.GGP
+            else f"AP{asked.type}_{asked.motor if named else axis or 0}"
         )
 
     def ports(self) -> Mapping[int, str]:
@@ -289,8 +293,8 @@ class TmclValues(Values):
             remarks.append(f"it has {count} motors; the simulated module has {simulated}")
         positions, targets = [], []
         for motor in range(count):
-            positions.append((yield from read(self.state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
-            targets.append((yield from read(self.state, Call(Command.GAP, Axis.TARGET_POSITION, motor))))
+            positions.append((yield from read(self.state, TmclCall(Command.GAP, AxisParameter.ACTUAL_POSITION, motor))))
+            targets.append((yield from read(self.state, TmclCall(Command.GAP, AxisParameter.TARGET_POSITION, motor))))
         code = readings.values.get(f"G{int(Global.BAUD)}")
         return Snapshot(
             kind="tmcl",
@@ -311,40 +315,40 @@ class TmclValues(Values):
         """The parts of a module, for each motor that was counted; at first they are counted."""
         if not self.state.motors:
             return (Part("motors", partial(_count, self.state)),)
-        found: list[Part] = [Part("program", partial(_program, self.state))]
+        parts: list[Part] = [Part("program", partial(_program, self.state))]
         for motor in range(self.state.motors):
             some = (FLAGS, *(axis for axis, _ in SWITCHES))
             asked = [*STATE, *(axis for axis in some if facts.get(_key(axis, motor)) != ABSENT)]
-            found.append(Part(f"motor {motor}", partial(_parameters, self.state, motor=motor, wanted=asked)))
+            parts.append(Part(f"motor {motor}", partial(_parameters, self.state, motor=motor, wanted=asked)))
             for axis in SETTINGS:
-                found.append(
+                parts.append(
                     Part(_key(axis, motor), partial(_parameters, self.state, motor=motor, wanted=(axis,)), slow=True)
                 )
-        return found
+        return parts
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
         return tuple(_conditions(self.state, facts, motor) for motor in range(self.state.motors))
 
     def check(self, word: str) -> str:
-        found = parameter(word)
-        if found is None:
+        asked = parameter(word)
+        if asked is None:
             raise Diagnostic(
                 f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1"
             )
-        if found.changed_by_reading:
-            raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
+        if asked.changed_by_reading:
+            raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{asked} reads it once")
         return f"AP{word}" if word[0].isdigit() else word.upper()
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
         """Read a parameter, none whose reading changes the module: `check` refuses that."""
-        found = parameter(word)
-        assert found is not None
-        return float((yield from read(self.state, found, priority)))
+        asked = parameter(word)
+        assert asked is not None
+        return float((yield from read(self.state, asked, priority)))
 
     def controls(self, axis: str) -> Controls:
-        found = controls_of(__file__, axis or "0")
+        controls = controls_of(__file__, axis or "0")
         counted = RELATIVE_FROM.get(self.state.relative.get(int(axis or 0), -1), "from where it counts is not known")
-        return {**found, BY: replace(found[BY], about=counted)}
+        return {**controls, BY: replace(controls[BY], about=counted)}
 
     @property
     def actions(self) -> Actions:

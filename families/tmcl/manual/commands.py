@@ -50,7 +50,7 @@ class Command(IntEnum):
     NOTIFY = 138
 
 
-class Move(IntEnum):
+class MoveType(IntEnum):
     """The types of MVP."""
 
     ABS = 0
@@ -58,7 +58,7 @@ class Move(IntEnum):
     COORD = 2
 
 
-class Search(IntEnum):
+class SearchAction(IntEnum):
     """The types of RFS."""
 
     START = 0
@@ -66,7 +66,7 @@ class Search(IntEnum):
     STATUS = 2
 
 
-class Running(IntEnum):
+class ProgramStatus(IntEnum):
     """What a program does: the value of command 135, and of global parameter 128."""
 
     HALTED = 0
@@ -91,7 +91,7 @@ MOTORS = range(256)
 
 
 @dataclass(frozen=True)
-class Row:
+class CommandRow:
     """One word. `prints`: its reply's value is what was asked for. `moves`: it can start motion."""
 
     command: Command
@@ -111,11 +111,11 @@ class Row:
         return f"{self.word} {', '.join(names)}".strip()
 
 
-MOVES: Mapping[str, int] = {each.name: each.value for each in Move}
-SEARCHES: Mapping[str, int] = {each.name: each.value for each in Search}
+MOVES: Mapping[str, int] = {move.name: move.value for move in MoveType}
+SEARCHES: Mapping[str, int] = {search.name: search.value for search in SearchAction}
 _TYPES = {"MVP": MOVES, "RFS": SEARCHES}
 ROWS = tuple(
-    Row(
+    CommandRow(
         Command[row["word"]],
         tuple(row["fields"].split()),
         row["title"],
@@ -125,11 +125,11 @@ ROWS = tuple(
     )
     for row in rows(__file__, "direct.csv")
 )
-WORDS: Mapping[str, Row] = {row.word: row for row in ROWS}
+WORDS: Mapping[str, CommandRow] = {row.word: row for row in ROWS}
 
 
 @dataclass(frozen=True)
-class Call:
+class TmclCall:
     """One command with its numbers, as bytes 1 to 7 of a request carry them."""
 
     command: int
@@ -151,7 +151,7 @@ class Call:
         return f"{row.word} {', '.join(given[name] for name in row.fields)}"
 
     @property
-    def row(self) -> Row | None:
+    def row(self) -> CommandRow | None:
         """The word for it; None for a command that is called by its number only."""
         return next((row for row in ROWS if row.command == self.command), None)
 
@@ -159,7 +159,7 @@ class Call:
     def prints(self) -> bool:
         """Whether the value of its reply is what was asked for."""
         if self.command == Command.RFS:
-            return self.type == Search.STATUS
+            return self.type == SearchAction.STATUS
         asks = (Command.VERSION, Command.PROGRAM_STATUS, Command.READ_PROGRAM)
         return self.command in asks or (self.row is not None and self.row.prints)
 
@@ -176,7 +176,7 @@ class Call:
         if self.command in (Command.SAP, Command.RSAP):
             return self.type in STARTING
         if self.command == Command.RFS:
-            return self.type == Search.START
+            return self.type == SearchAction.START
         return self.row is None or self.row.moves
 
     @property
@@ -207,61 +207,61 @@ BY_NUMBER = (TYPE, MOTOR, VALUE)
 """Fields after the number of a command."""
 
 
-class LineError(ValueError):
+class TmclLineError(ValueError):
     """An invalid TMCL line; the text says why and what is valid."""
 
 
-def parse(text: str) -> Call:
+def parse(text: str) -> TmclCall:
     """The command in a line. Raises LineError."""
-    found = _read(text)
-    if isinstance(found, LineError):
-        raise LineError(*found.args)  # one that is kept would gather tracebacks
-    return found
+    read_call = _read(text)
+    if isinstance(read_call, TmclLineError):
+        raise TmclLineError(*read_call.args)  # one that is kept would gather tracebacks
+    return read_call
 
 
-def parsed(text: str) -> Call | None:
+def parsed(text: str) -> TmclCall | None:
     """The command in a line; None for an invalid line."""
-    found = _read(text)
-    return None if isinstance(found, LineError) else found
+    read_call = _read(text)
+    return None if isinstance(read_call, TmclLineError) else read_call
 
 
 @lru_cache(maxsize=4096)
-def _read(text: str) -> Call | LineError:
+def _read(text: str) -> TmclCall | TmclLineError:
     try:
         return _parsed(text)
-    except LineError as error:
+    except TmclLineError as error:
         return error
 
 
-def _parsed(text: str) -> Call:
+def _parsed(text: str) -> TmclCall:
     word, *rest = re.split(r"[ \t]+", text.strip(BLANKS), maxsplit=1)
     fields = [field.strip(BLANKS) for field in "".join(rest).split(",")] if rest else []
     if word.isascii() and word.isdigit():
         if int(word) not in BYTE:
-            raise LineError(f"no command {word}; valid: 0 to 255")
+            raise TmclLineError(f"no command {word}; valid: 0 to 255")
         if len(fields) != len(BY_NUMBER):
-            raise LineError(f"a command by its number takes 3 fields: {word} {', '.join(BY_NUMBER)}")
-        return Call(int(word), *(_number(name, field) for name, field in zip(BY_NUMBER, fields, strict=True)))
+            raise TmclLineError(f"a command by its number takes 3 fields: {word} {', '.join(BY_NUMBER)}")
+        return TmclCall(int(word), *(_number(name, field) for name, field in zip(BY_NUMBER, fields, strict=True)))
     row = WORDS.get(word.upper())
     if row is None:
         near = difflib.get_close_matches(word.upper(), list(WORDS), 3, 0.6)
         hint = f"did you mean {' or '.join(near)}?" if near else f"valid: {', '.join(WORDS)}"
-        raise LineError(f"no command {word!r}; {hint}")
+        raise TmclLineError(f"no command {word!r}; {hint}")
     if len(fields) != len(row.fields):
-        raise LineError(f"{row.word} takes {counted(len(row.fields), 'field')}: {row.syntax}")
+        raise TmclLineError(f"{row.word} takes {counted(len(row.fields), 'field')}: {row.syntax}")
     values = {}
     for name, field in zip(row.fields, fields, strict=True):
         known = row.types.get(field.upper()) if name == TYPE else None
         if known is None and name == TYPE and row.types and not NUMBER.fullmatch(field):
-            raise LineError(f"{row.word} has no type {field!r}; valid: {', '.join(row.types)}")
+            raise TmclLineError(f"{row.word} has no type {field!r}; valid: {', '.join(row.types)}")
         values[name] = _number(name, field) if known is None else known
-    return Call(row.command, values.get(TYPE, 0), values.get(MOTOR, values.get(BANK, 0)), values.get(VALUE, 0))
+    return TmclCall(row.command, values.get(TYPE, 0), values.get(MOTOR, values.get(BANK, 0)), values.get(VALUE, 0))
 
 
 def _number(name: str, field: str) -> int:
     valid = RANGES[name]
     if not NUMBER.fullmatch(field) or int(field) not in valid:
-        raise LineError(f"{name} cannot be {field!r}; valid: {valid[0]} to {valid[-1]}")
+        raise TmclLineError(f"{name} cannot be {field!r}; valid: {valid[0]} to {valid[-1]}")
     return int(field)
 
 
@@ -290,7 +290,7 @@ REFUSALS: Mapping[int, tuple[str, str]] = {
 """Meaning of a refusing status and what to do, for a person."""
 
 
-class Axis(IntEnum):
+class AxisParameter(IntEnum):
     """The number of an axis parameter."""
 
     TARGET_POSITION = 0
@@ -343,24 +343,26 @@ class Global(IntEnum):
     SUPPRESS_REPLY = 255
 
 
-_NAMES: Mapping[str, Axis | Global] = {each.name.replace("_", ""): each for each in (*Global, *Axis)}
+_NAMES: Mapping[str, AxisParameter | Global] = {
+    member.name.replace("_", ""): member for member in (*Global, *AxisParameter)
+}
 _PARAMETER = re.compile(r"(?:(AP|G)?(0|[1-9]\d{0,2})|([A-Z]\w*?[A-Z]))(?:[_/](\d))?", re.ASCII)
 
 
-def parameter(name: str) -> Call | None:
+def parameter(name: str) -> TmclCall | None:
     """The command that reads a parameter: `4`, `AP4` or `maximum_velocity`; `G75` or `pause` is a global one.
 
     `4_1` or `AP4/1` is that of motor 1. None: no parameter has that name.
     """
-    found = _PARAMETER.fullmatch(name.strip().upper())
-    if found is None:
+    match = _PARAMETER.fullmatch(name.strip().upper())
+    if match is None:
         return None
-    named = _NAMES.get(found[3].replace("_", "")) if found[3] else None
-    number = named if named is not None else int(found[2] or len(BYTE))
-    of_module = isinstance(named, Global) or found[1] == "G"
-    if number not in BYTE or (of_module and found[4]):
+    named = _NAMES.get(match[3].replace("_", "")) if match[3] else None
+    number = named if named is not None else int(match[2] or len(BYTE))
+    of_module = isinstance(named, Global) or match[1] == "G"
+    if number not in BYTE or (of_module and match[4]):
         return None
-    return Call(Command.GGP if of_module else Command.GAP, int(number), int(found[4] or 0))
+    return TmclCall(Command.GGP if of_module else Command.GAP, int(number), int(match[4] or 0))
 
 
 def setting_name(name: str) -> str:

@@ -12,7 +12,7 @@ from multidrop.base.files import split_lines
 from multidrop.dialects.editing import Block, EditingLanguage, Offer, Span, Use, UserName, Word, collected, last_line
 from multidrop.families.tmcl.manual import instructions
 from multidrop.families.tmcl.manual.help import LANGUAGE
-from multidrop.families.tmcl.manual.program_file import NAME, Divided, Piece, divided, negated, remark_at
+from multidrop.families.tmcl.manual.program_file import NAME, Divided, LinePiece, divided, negated, remark_at
 
 
 class TmclEditing(EditingLanguage):
@@ -28,17 +28,17 @@ class TmclEditing(EditingLanguage):
         """Return the labels and constants of a file, in order of their first places."""
         lines = split_lines(text)
         known: dict[str, tuple[str, str]] = {}
-        for _, found in _divided(lines):
-            for piece, kind in ((found.label, "label"), (found.name, "constant")):
+        for _, halves in _divided(lines):
+            for piece, kind in ((halves.label, "label"), (halves.name, "constant")):
                 if piece is not None:
                     known.setdefault(piece.text.upper(), (piece.text, kind))
 
         def uses() -> Iterator[Use]:
-            for number, found in _divided(lines):
-                for piece in (found.label, found.name, found.value, *found.fields):
+            for number, halves in _divided(lines):
+                for piece in (halves.label, halves.name, halves.value, *halves.fields):
                     named = piece and (negated(piece) or piece)
                     if named and named.text.upper() in known:
-                        declares = piece in (found.label, found.name)
+                        declares = piece in (halves.label, halves.name)
                         yield Use(*known[named.text.upper()], _span(number, named), declares)
 
         return collected(uses(), lambda at: self.remark(lines[at]))
@@ -55,42 +55,42 @@ class TmclEditing(EditingLanguage):
         """Return whether a field would be another one, as with ABS."""
         places = [place.line for place in name.places]
         named = [each for each in self.names("\n".join(renamed)) if each.word == word]
-        return "" if places == [place.line for each in named for place in each.places] else "a field"
+        return "" if places == [place.line for user_name in named for place in user_name.places] else "a field"
 
     def words(self, line: str, names: Container[str]) -> list[Word]:
         """Return the words of a line that may have help: its command."""
-        found = divided(line)
-        if found is None or found.word is None:
+        halves = divided(line)
+        if halves is None or halves.word is None:
             return []
-        start = found.word.column - 1
-        return [Word(start, start + len(found.word.text), found.word.text)]
+        start = halves.word.column - 1
+        return [Word(start, start + len(halves.word.text), halves.word.text)]
 
     def describe(self, word: str, product: str) -> list[str]:
         return LANGUAGE.describe(word, product) if word.upper() in instructions.WORDS else []
 
     def offered(self, begun: str, word: str, names: Iterable[UserName], product: str) -> Iterator[Offer]:
         """Yield commands at the head of a line; in a field its words, labels where it is an address, constants else."""
-        found = divided(begun)
-        if found is None or found.word is None:
-            rows = instructions.WORDS.values() if found is None or found.name is None else ()
+        halves = divided(begun)
+        if halves is None or halves.word is None:
+            rows = instructions.WORDS.values() if halves is None or halves.name is None else ()
             yield from (Offer(row.word, row.title, "starts" if row.moves else "word") for row in rows)
             return
-        row = instructions.fields_of(found.word.text)
-        at = max(len(found.fields) - 1, 0)
+        row = instructions.fields_of(halves.word.text)
+        at = max(len(halves.fields) - 1, 0)
         if row is None or at >= len(row[1]):
             return
         wanted = row[1][at]
         yield from (Offer(name, wanted.name, "word") for name in wanted.words)
         kind = "label" if wanted.label else "constant"
-        yield from (each.offer for each in names if each.kind == kind)
+        yield from (name.offer for name in names if name.kind == kind)
 
     def outline(self, text: str) -> list[Block]:
         """Return each label, with the lines up to the next one, and the constants."""
         end = len(split_lines(text)) - 1
-        found = [(name, place) for name in self.names(text) for place in name.declared]
-        labels = sorted(place.line for name, place in found if name.kind == "label")
+        declared = [(name, place) for name in self.names(text) for place in name.declared]
+        labels = sorted(place.line for name, place in declared if name.kind == "label")
         blocks = []
-        for name, place in sorted(found, key=lambda each: each[1]):
+        for name, place in sorted(declared, key=lambda each: each[1]):
             last = place.line if name.kind == "constant" else last_line(place.line, labels, end)
             blocks.append(Block(name.kind, name.word, name.remark, place, last))
         return blocks
@@ -102,9 +102,9 @@ EDITING = TmclEditing()
 def _divided(lines: Iterable[str]) -> Iterator[tuple[int, Divided]]:
     """The lines that are not empty, with their numbers from 0."""
     for number, line in enumerate(lines):
-        if (found := divided(line)) is not None:
-            yield number, found
+        if (halves := divided(line)) is not None:
+            yield number, halves
 
 
-def _span(line: int, piece: Piece) -> Span:
+def _span(line: int, piece: LinePiece) -> Span:
     return Span(line, piece.column - 1, piece.column - 1 + len(piece.text))

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.language import Language, labelled, remedied
 from multidrop.families.tmcl.manual import instructions
-from multidrop.families.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
+from multidrop.families.tmcl.manual.commands import REFUSALS, WORDS, Command, CommandRow
 from multidrop.families.tmcl.manual.modules import RELATIVE_FROM, module_of
-from multidrop.families.tmcl.manual.parameters import Parameter
+from multidrop.families.tmcl.manual.parameters import TmclParameter
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
 ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})
@@ -61,24 +61,24 @@ class TmclLanguage(Language):
 LANGUAGE = TmclLanguage()
 
 
-def _parameters(row: Row, product: str) -> Iterator[str]:
+def _parameters(row: CommandRow, product: str) -> Iterator[str]:
     """The parameters that a command takes by number."""
     setting = row.command in (Command.SAP, Command.SGP)
-    for number, each in _table(row, product).items():
-        if each.writable or not setting:
-            unit = f", {each.unit}" if each.unit else ""
-            limits = f", {each.valid}" if each.writable else ""
-            yield f"  {number:>3}  {each.title}{unit}{limits}"
+    for number, parameter in _table(row, product).items():
+        if parameter.writable or not setting:
+            unit = f", {parameter.unit}" if parameter.unit else ""
+            limits = f", {parameter.valid}" if parameter.writable else ""
+            yield f"  {number:>3}  {parameter.title}{unit}{limits}"
 
 
-def _stored(row: instructions.Row) -> list[str]:
+def _stored(row: instructions.InstructionRow) -> list[str]:
     """Describe a word that only a program has."""
-    fields = ((each.name, each.hint.removeprefix("valid: ")) for each in row.fields)
+    fields = ((field.name, field.hint.removeprefix("valid: ")) for field in row.fields)
     facts = (("syntax", row.syntax), *fields, ("note", MOVES * row.moves), ("use", "in programs only"))
     return [f"{row.word}: {row.title}", *labelled(facts)]
 
 
-def _table(row: Row, product: str) -> Mapping[int, Parameter]:
+def _table(row: CommandRow, product: str) -> Mapping[int, TmclParameter]:
     if row.command in ON_AXIS:
         return module_of(product).axis
     return module_of(product).banks[0] if row.command in ON_MODULE else {}

@@ -17,7 +17,7 @@ from enum import IntEnum
 
 from multidrop.base.files import rows
 from multidrop.families.tmcl.manual import commands
-from multidrop.families.tmcl.manual.commands import BYTE, MOTOR, TYPE, VALUE, Call, Command
+from multidrop.families.tmcl.manual.commands import BYTE, MOTOR, TYPE, VALUE, Command, TmclCall
 from multidrop.families.tmcl.manual.parameters import INT32, STARTING
 
 MEMORY = 2048
@@ -30,7 +30,7 @@ CONTROL = 128
 """The first number of the control commands."""
 
 
-class Word(IntEnum):
+class ProgramWord(IntEnum):
     """The number of a line that only a program has."""
 
     SIO = 14
@@ -72,7 +72,7 @@ class Word(IntEnum):
     CALL = 80
 
 
-class Operation(IntEnum):
+class Calculation(IntEnum):
     """The types of the words that calculate."""
 
     ADD = 0
@@ -89,7 +89,7 @@ class Operation(IntEnum):
     COMP = 11
 
 
-class Condition(IntEnum):
+class JumpCondition(IntEnum):
     """The types of JC and CALL: the last value, the last comparison, an error flag."""
 
     ZE = 0
@@ -129,7 +129,7 @@ class Flag(IntEnum):
 
 
 @dataclass(frozen=True)
-class Field:
+class InstructionField:
     """One field of a line: its name, the byte or value that it becomes, what is valid. `label`: it is an address."""
 
     name: str
@@ -164,11 +164,11 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Row:
+class InstructionRow:
     """One word. `moves`: it can start motion."""
 
     number: int
-    fields: tuple[Field, ...]
+    fields: tuple[InstructionField, ...]
     title: str
     word: str
     moves: bool = False
@@ -179,42 +179,44 @@ class Row:
 
 
 def _words(of: type[IntEnum], *without: IntEnum) -> Mapping[str, int]:
-    return {each.name: each.value for each in of if each not in without}
+    return {member.name: member.value for member in of if member not in without}
 
 
 _NUMBER = re.compile(r"[+-]?(?:\d{1,11}|0[xX][0-9A-Fa-f]{1,8})", re.ASCII)
-_FIELDS: Mapping[str, Field] = {
-    **{name: Field(name, TYPE, BYTE) for name in ("parameter", "port", "interrupt")},
-    **{name: Field(name, MOTOR, BYTE) for name in ("motor", "bank", "variable")},
-    "counter": Field("variable", TYPE, BYTE),
-    "other": Field("variable", VALUE, BYTE),
-    "value": Field("value", VALUE, INT32),
-    "ticks": Field("ticks", VALUE, range(-1, INT32.stop)),
-    "coordinate": Field("coordinate", TYPE, range(21)),
-    "address": Field("label", VALUE, range(MEMORY), label=True),
-    "condition": Field("condition", TYPE, BYTE, _words(Condition)),
-    "event": Field("condition", TYPE, BYTE, _words(Wait)),
-    "flag": Field("flag", TYPE, BYTE, _words(Flag)),
-    "move": Field("move", TYPE, BYTE, commands.MOVES),
-    "all": Field("operation", TYPE, BYTE, _words(Operation)),
-    "no_swap": Field("operation", TYPE, BYTE, _words(Operation, Operation.SWAP)),
-    "with_x": Field("operation", TYPE, BYTE, _words(Operation, Operation.COMP)),
-    "with_value": Field("operation", TYPE, BYTE, _words(Operation, Operation.SWAP, Operation.COMP)),
+_FIELDS: Mapping[str, InstructionField] = {
+    **{name: InstructionField(name, TYPE, BYTE) for name in ("parameter", "port", "interrupt")},
+    **{name: InstructionField(name, MOTOR, BYTE) for name in ("motor", "bank", "variable")},
+    "counter": InstructionField("variable", TYPE, BYTE),
+    "other": InstructionField("variable", VALUE, BYTE),
+    "value": InstructionField("value", VALUE, INT32),
+    "ticks": InstructionField("ticks", VALUE, range(-1, INT32.stop)),
+    "coordinate": InstructionField("coordinate", TYPE, range(21)),
+    "address": InstructionField("label", VALUE, range(MEMORY), label=True),
+    "condition": InstructionField("condition", TYPE, BYTE, _words(JumpCondition)),
+    "event": InstructionField("condition", TYPE, BYTE, _words(Wait)),
+    "flag": InstructionField("flag", TYPE, BYTE, _words(Flag)),
+    "move": InstructionField("move", TYPE, BYTE, commands.MOVES),
+    "all": InstructionField("operation", TYPE, BYTE, _words(Calculation)),
+    "no_swap": InstructionField("operation", TYPE, BYTE, _words(Calculation, Calculation.SWAP)),
+    "with_x": InstructionField("operation", TYPE, BYTE, _words(Calculation, Calculation.COMP)),
+    "with_value": InstructionField("operation", TYPE, BYTE, _words(Calculation, Calculation.SWAP, Calculation.COMP)),
 }
 """The fields that `program.csv` names."""
-_STARTS = frozenset({Word.MVPA, Word.ROLA, Word.RORA, Word.AAP})
+_STARTS = frozenset({ProgramWord.MVPA, ProgramWord.ROLA, ProgramWord.RORA, ProgramWord.AAP})
 
 
-def _direct(row: commands.Row) -> Row:
+def _direct(row: commands.CommandRow) -> InstructionRow:
     fields = (
-        Field(name, MOTOR if name == commands.BANK else name, commands.RANGES[name], row.types if name == TYPE else {})
+        InstructionField(
+            name, MOTOR if name == commands.BANK else name, commands.RANGES[name], row.types if name == TYPE else {}
+        )
         for name in row.fields
     )
-    return Row(int(row.command), tuple(fields), row.title, row.word, row.moves)
+    return InstructionRow(int(row.command), tuple(fields), row.title, row.word, row.moves)
 
 
-ROWS: Mapping[int, Row] = {
-    int(number): Row(
+ROWS: Mapping[int, InstructionRow] = {
+    int(number): InstructionRow(
         int(number),
         tuple(_FIELDS[each] for each in row["fields"].split()),
         row["title"],
@@ -222,15 +224,15 @@ ROWS: Mapping[int, Row] = {
         number in _STARTS,
     )
     for row in rows(__file__, "program.csv")
-    for number in (Word[row["word"]],)
+    for number in (ProgramWord[row["word"]],)
 } | {int(row.command): _direct(row) for row in commands.ROWS}
 """Every word by its number."""
-WORDS: Mapping[str, Row] = {row.word: row for row in ROWS.values()}
+WORDS: Mapping[str, InstructionRow] = {row.word: row for row in ROWS.values()}
 JUMPS = frozenset(number for number, row in ROWS.items() if any(each.label for each in row.fields))
 """The lines whose value is an address."""
-ENDS = frozenset({EMPTY, Word.JA, Word.RSUB, Word.STOP, Word.RETI, Word.RST})
+ENDS = frozenset({EMPTY, ProgramWord.JA, ProgramWord.RSUB, ProgramWord.STOP, ProgramWord.RETI, ProgramWord.RST})
 """The lines after which the next one is not executed."""
-BY_NUMBER = (Field("type", TYPE, BYTE), Field("motor", MOTOR, BYTE), _FIELDS["value"])
+BY_NUMBER = (InstructionField("type", TYPE, BYTE), InstructionField("motor", MOTOR, BYTE), _FIELDS["value"])
 WEARS = frozenset({Command.STAP, Command.STGP})
 """The lines that write to the EEPROM."""
 
@@ -246,7 +248,7 @@ def unknown(word: str) -> tuple[str, str]:
     return f"no command {word!r}", f"is {near[0]} meant?" if near else "help and completion list the words"
 
 
-def fields_of(word: str) -> tuple[int, tuple[Field, ...]] | None:
+def fields_of(word: str) -> tuple[int, tuple[InstructionField, ...]] | None:
     """The number of a word, or of a line by its number, and its fields; None: there is no such word."""
     row = WORDS.get(word.upper())
     if row is not None:
@@ -254,12 +256,12 @@ def fields_of(word: str) -> tuple[int, tuple[Field, ...]] | None:
     return (int(word), BY_NUMBER) if word.isascii() and word.isdigit() and int(word) < CONTROL else None
 
 
-def call_with(number: int, fields: tuple[Field, ...], values: tuple[int, ...]) -> Call:
+def call_with(number: int, fields: tuple[InstructionField, ...], values: tuple[int, ...]) -> TmclCall:
     placed = {each.place: value for each, value in zip(fields, values, strict=True)}
-    return Call(number, placed.get(TYPE, 0), placed.get(MOTOR, 0), placed.get(VALUE, 0))
+    return TmclCall(number, placed.get(TYPE, 0), placed.get(MOTOR, 0), placed.get(VALUE, 0))
 
 
-def spelled(call: Call, label: str = "") -> str:
+def spelled(call: TmclCall, label: str = "") -> str:
     """A line as a person writes it; `label`: in place of its address. By its number where no word gives it."""
     row, placed = ROWS.get(call.command), {TYPE: call.type, MOTOR: call.motor, VALUE: call.value}
     if row is not None:
@@ -271,9 +273,9 @@ def spelled(call: Call, label: str = "") -> str:
     return f"{call.command} {call.type}, {call.motor}, {call.value}"
 
 
-def moves(call: Call) -> bool:
+def moves(call: TmclCall) -> bool:
     """Whether a line of a program can start motion."""
-    if call.command == Word.AAP:
+    if call.command == ProgramWord.AAP:
         return call.type in STARTING
     row = ROWS.get(call.command)
     return call.moves if row is None or row.word in commands.WORDS else row.moves

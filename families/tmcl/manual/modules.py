@@ -10,22 +10,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.base.files import rows
-from multidrop.families.tmcl.manual.commands import Axis, Status
-from multidrop.families.tmcl.manual.parameters import GROUPS, INT32, Parameter
+from multidrop.families.tmcl.manual.commands import AxisParameter, Status
+from multidrop.families.tmcl.manual.parameters import GROUPS, INT32, TmclParameter
 
 MIRRORED, INVERTED = 64, 128
 """Added to a mode of the reference search: the right switch in place of the left one; the home switch inverted."""
 
 
 _AXIS, _CHIP, _GLOBAL = GROUPS["axis"], GROUPS["chip"], GROUPS["global"]
-GLOBAL: Mapping[int, Parameter] = {number: row for number, row in _GLOBAL.items() if row.known}
+GLOBAL: Mapping[int, TmclParameter] = {number: row for number, row in _GLOBAL.items() if row.known}
 RELATIVE_FROM: Mapping[int, str] = {
     0: "counts from the last target",
     1: "counts from here",
     2: "counts from the encoder's position",
 }
 """The values of axis parameter 127; only some modules have it, those that count in microsteps."""
-USER = Parameter("user variable; STGP keeps it without power", INT32)
+USER = TmclParameter("user variable; STGP keeps it without power", INT32)
 USERS = range(256)
 """The numbers of the user variables, in bank 2."""
 BAUDS: Mapping[int, int] = {0: 9600, 1: 14400, 2: 19200, 3: 28800, 4: 38400, 5: 57600, 6: 76800, 7: 115200}
@@ -50,8 +50,8 @@ class Module:
     """
 
     version: str
-    axis: Mapping[int, Parameter]
-    banks: Mapping[int, Mapping[int, Parameter]]
+    axis: Mapping[int, TmclParameter]
+    banks: Mapping[int, Mapping[int, TmclParameter]]
     motors: int = 1
     inputs: Sequence[int] = ()
     outputs: Sequence[int] = ()
@@ -79,7 +79,9 @@ def _module(row: Mapping[str, str]) -> Module:
         {
             0: {number: _GLOBAL[number] for number in _numbers(row["global"])},
             2: dict.fromkeys(USERS, USER),
-            3: {number: Parameter(_interrupt(number), INT32, known=False) for number in _numbers(row["interrupts"])},
+            3: {
+                number: TmclParameter(_interrupt(number), INT32, known=False) for number in _numbers(row["interrupts"])
+            },
         },
         int(row["motors"]),
         tuple(_numbers(row["inputs"])),
@@ -93,7 +95,7 @@ def _module(row: Mapping[str, str]) -> Module:
 MODULES: Mapping[str, Module] = {row["module"]: _module(row) for row in rows(__file__, "modules.csv")}
 """By the number in the module's name."""
 COMMON = Module(
-    "", {number: row for number, row in _AXIS.items() if row.known and number != Axis.UNIT_MODE}, {0: GLOBAL}
+    "", {number: row for number, row in _AXIS.items() if row.known and number != AxisParameter.UNIT_MODE}, {0: GLOBAL}
 )
 """What one-axis modules have in common; for a module without a table."""
 PREFIX = "TMCM"

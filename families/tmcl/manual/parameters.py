@@ -2,8 +2,8 @@
 
 The table has the axis parameters (`axis`), those that modules which count in units of their chip have otherwise
 (`chip`), the global ones of bank 0 (`global`), and those that one module has otherwise (its number). A row has a cell
-for every fact of a `Parameter`, where the columns are explained; `-` is none. An empty cell is an error, so that a new
-parameter answers every question. (TMCL firmware manuals, "Axis parameters", "Global parameters".)
+for every fact of a `TmclParameter`, where the columns are explained; `-` is none. An empty cell is an error, so that a
+new parameter answers every question. (TMCL firmware manuals, "Axis parameters", "Global parameters".)
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Starts(StrEnum):
 
 
 @dataclass(frozen=True)
-class Parameter:
+class TmclParameter:
     """One parameter. `limits`: the values that can be set, in order; empty for one that is only read."""
 
     title: str
@@ -86,18 +86,18 @@ def _limits(text: str) -> Sequence[int]:
         return INT32
     ends = (part.split("..") for part in text.split())
     ranges = [range(int(low), int(high) + 1) for low, high in ends]
-    return ranges[0] if len(ranges) == 1 else tuple(n for each in ranges for n in each)
+    return ranges[0] if len(ranges) == 1 else tuple(n for span in ranges for n in span)
 
 
 def _text(text: str) -> str:
     return "" if text == NONE else text
 
 
-def record(row: Mapping[str, str]) -> Parameter:
+def record(row: Mapping[str, str]) -> TmclParameter:
     """Make the record of a row. Raises ValueError for a wrong cell."""
     if empty := [column for column, text in row.items() if not text]:
         raise ValueError(f"the row of {row['group']} {row['number']} says nothing of: {', '.join(empty)}")
-    return Parameter(
+    return TmclParameter(
         title=row["title"],
         limits=_limits(row["valid"]),
         unit=_text(row["unit"]),
@@ -115,8 +115,8 @@ def record(row: Mapping[str, str]) -> Parameter:
     )
 
 
-def _groups() -> Mapping[str, Mapping[int, Parameter]]:
-    found: dict[str, dict[int, Parameter]] = {}
+def _groups() -> Mapping[str, Mapping[int, TmclParameter]]:
+    found: dict[str, dict[int, TmclParameter]] = {}
     for row in rows(__file__, "parameters.csv"):
         found.setdefault(row["group"], {})[int(row["number"])] = record(row)
     return found
@@ -124,16 +124,16 @@ def _groups() -> Mapping[str, Mapping[int, Parameter]]:
 
 GROUPS = _groups()
 """The parameters by group and number: `axis`, `chip`, `global`, and the name of a module for those that only it has."""
-AXIS: Mapping[int, Parameter] = {**GROUPS["chip"], **GROUPS["axis"]}
+AXIS: Mapping[int, TmclParameter] = {**GROUPS["chip"], **GROUPS["axis"]}
 """A row for each axis parameter of any module."""
 
 
-def row_of(number: int, of_module: bool) -> Parameter | None:
+def row_of(number: int, of_module: bool) -> TmclParameter | None:
     """The row of an axis parameter, or of a global one `of_module`; of a module without a row, too. None: no such."""
     return (GROUPS["global"] if of_module else AXIS).get(number)
 
 
-def those(fact: Callable[[Parameter], bool]) -> frozenset[int]:
+def those(fact: Callable[[TmclParameter], bool]) -> frozenset[int]:
     """The axis parameters for which a fact holds."""
     return frozenset(number for number, row in AXIS.items() if fact(row))
 

@@ -24,9 +24,9 @@ from typing import NamedTuple
 from multidrop.base.files import SourceLine, split_lines, wrong_characters
 from multidrop.base.text import counted
 from multidrop.dialects.program_files import (
-    Entry,
-    Part,
+    LinePart,
     Problem,
+    ProgramEntry,
     check_comment,
     check_enter,
     errors,
@@ -37,7 +37,7 @@ from multidrop.dialects.program_files import (
     walk,
 )
 from multidrop.families.tmcl.manual import instructions
-from multidrop.families.tmcl.manual.commands import BLANKS, Call, Command
+from multidrop.families.tmcl.manual.commands import BLANKS, Command, TmclCall
 from multidrop.families.tmcl.manual.instructions import (
     CONTROL,
     EMPTY,
@@ -47,8 +47,8 @@ from multidrop.families.tmcl.manual.instructions import (
     ROWS,
     STACK,
     WEARS,
-    Field,
-    Word,
+    InstructionField,
+    ProgramWord,
     call_with,
     fields_of,
     number_of,
@@ -65,7 +65,7 @@ _LINE = re.compile(
 )
 
 
-class Piece(NamedTuple):
+class LinePiece(NamedTuple):
     """A part of a line and its column, from 1."""
 
     text: str
@@ -77,68 +77,68 @@ class Divided:
     """One line in its parts. `name` and `value`: those of a constant."""
 
     number: int
-    label: Piece | None = None
-    name: Piece | None = None
-    value: Piece | None = None
-    word: Piece | None = None
-    fields: tuple[Piece, ...] = ()
+    label: LinePiece | None = None
+    name: LinePiece | None = None
+    value: LinePiece | None = None
+    word: LinePiece | None = None
+    fields: tuple[LinePiece, ...] = ()
 
 
-class Placed(NamedTuple):
+class PlacedLine(NamedTuple):
     """A line of the memory: the line of the file that it comes from, its address, and what is stored."""
 
     source: int
     at: int
-    call: Call
+    call: TmclCall
 
 
 @dataclass
 class Assembled:
     """What a file gives: its lines of the memory, its labels and constants in capitals, its problems."""
 
-    lines: list[Placed] = field(default_factory=list)
+    lines: list[PlacedLine] = field(default_factory=list)
     labels: dict[str, int] = field(default_factory=dict)
     constants: dict[str, int] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
 
-    def constant(self, piece: Piece) -> int | None:
+    def constant(self, piece: LinePiece) -> int | None:
         """The value of a constant, with the other sign behind a minus; None for what is no constant."""
         opposite = negated(piece)
         number = self.constants.get((opposite or piece).text.upper())
         return number if number is None or opposite is None else -number
 
-    def wrong(self, line: int, place: Piece, what: str, hint: str = "") -> None:
+    def wrong(self, line: int, place: LinePiece, what: str, hint: str = "") -> None:
         self.problems.append(Problem(line, place.column, what, hint))
 
 
-def negated(piece: Piece) -> Piece | None:
+def negated(piece: LinePiece) -> LinePiece | None:
     """The name behind a minus, `Speed` of `-Speed`; None for any other text."""
     name = piece.text[1:].lstrip(BLANKS)
     if not piece.text.startswith("-") or not NAME.fullmatch(name):
         return None
-    return Piece(name, piece.column + len(piece.text) - len(name))
+    return LinePiece(name, piece.column + len(piece.text) - len(name))
 
 
 def remark_at(line: str) -> int:
     """The index at which the remark of a line begins; the length of a line without one."""
-    found = _REMARK.search(line)
-    return found.start() if found else len(line)
+    match = _REMARK.search(line)
+    return match.start() if match else len(line)
 
 
 def divided(line: str, number: int = 1) -> Divided | None:
     """The parts of a line; None for an empty one."""
     code = line[: remark_at(line)]
-    found = _LINE.fullmatch(code)
-    if not code.strip() or found is None:
+    match = _LINE.fullmatch(code)
+    if not code.strip() or match is None:
         return None
 
-    def piece(group: str) -> Piece | None:
-        return None if found[group] is None else Piece(found[group], found.start(group) + 1)
+    def piece(group: str) -> LinePiece | None:
+        return None if match[group] is None else LinePiece(match[group], match.start(group) + 1)
 
-    fields, at = [], found.start("fields") + 1
-    for each in found["fields"].split(",") if found["fields"] else ():
-        fields.append(Piece(each.strip(BLANKS), at + len(each) - len(each.lstrip())))
-        at += len(each) + 1
+    fields, at = [], match.start("fields") + 1
+    for field_text in match["fields"].split(",") if match["fields"] else ():
+        fields.append(LinePiece(field_text.strip(BLANKS), at + len(field_text) - len(field_text.lstrip())))
+        at += len(field_text) + 1
     return Divided(number, piece("label"), piece("name"), piece("value"), piece("word"), tuple(fields))
 
 
@@ -148,21 +148,21 @@ def divided(line: str, number: int = 1) -> Divided | None:
 def assembled(lines: Iterable[SourceLine]) -> Assembled:
     """Assemble the lines of a file, and report every fault: one for each line, at most."""
     made = Assembled()
-    parts = [found for line in lines if (found := divided(line.text, line.number)) is not None]
+    parts = [halves for line in lines if (halves := divided(line.text, line.number)) is not None]
     at, names = 0, dict[str, int]()
-    for each in parts:
-        if each.label is not None:
-            _declare(made, each, each.label, names)
-            made.labels.setdefault(each.label.text.upper(), at)
-        if each.name is not None and each.value is not None:
-            _declare(made, each, each.name, names)
-            number = _constant(made, each, each.value)
-            made.constants.setdefault(each.name.text.upper(), number)
-        at += each.word is not None
-    for each in parts:
-        if each.word is not None:
-            call = _command(made, each, each.word)
-            made.lines.append(Placed(each.number, len(made.lines), call or Call(EMPTY)))
+    for part in parts:
+        if part.label is not None:
+            _declare(made, part, part.label, names)
+            made.labels.setdefault(part.label.text.upper(), at)
+        if part.name is not None and part.value is not None:
+            _declare(made, part, part.name, names)
+            number = _constant(made, part, part.value)
+            made.constants.setdefault(part.name.text.upper(), number)
+        at += part.word is not None
+    for part in parts:
+        if part.word is not None:
+            call = _command(made, part, part.word)
+            made.lines.append(PlacedLine(part.number, len(made.lines), call or TmclCall(EMPTY)))
     if len(made.lines) > MEMORY:
         place, what = made.lines[MEMORY].source, f"there are {len(made.lines)} lines, and a module holds {MEMORY}"
         made.problems.append(Problem(place, 1, what, "the memory ends at this line"))
@@ -170,7 +170,7 @@ def assembled(lines: Iterable[SourceLine]) -> Assembled:
     return made
 
 
-def _declare(made: Assembled, line: Divided, name: Piece, names: dict[str, int]) -> None:
+def _declare(made: Assembled, line: Divided, name: LinePiece, names: dict[str, int]) -> None:
     """Note the line that gives a name; two lines cannot give the same one."""
     word = name.text.upper()
     if word in names:
@@ -180,7 +180,7 @@ def _declare(made: Assembled, line: Divided, name: Piece, names: dict[str, int])
     names.setdefault(word, line.number)
 
 
-def _constant(made: Assembled, line: Divided, value: Piece) -> int:
+def _constant(made: Assembled, line: Divided, value: LinePiece) -> int:
     number = number_of(value.text)
     number = made.constant(value) if number is None else number
     if number is None or number not in instructions.BY_NUMBER[-1].valid:
@@ -190,7 +190,7 @@ def _constant(made: Assembled, line: Divided, value: Piece) -> int:
     return number
 
 
-def _command(made: Assembled, line: Divided, word: Piece) -> Call | None:
+def _command(made: Assembled, line: Divided, word: LinePiece) -> TmclCall | None:
     """The command of a line; None where it is wrong, which is noted."""
     if word.text.startswith("#"):
         made.wrong(line.number, word, f"{word.text} is not supported", "copy the lines of that file into this one")
@@ -216,7 +216,7 @@ def _command(made: Assembled, line: Divided, word: Piece) -> Call | None:
     return call_with(number, fields, known) if len(known) == len(fields) else None
 
 
-def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int | None:
+def _value(made: Assembled, line: Divided, given: LinePiece, wanted: InstructionField) -> int | None:
     """The number of one field; None where it is wrong, and noted unless another field of the line is."""
     name = given.text.upper()
     number = wanted.read(given.text)
@@ -226,7 +226,7 @@ def _value(made: Assembled, line: Divided, given: Piece, wanted: Field) -> int |
         number = made.labels.get(name)
     if number is not None:
         return number
-    if any(each.line == line.number for each in made.problems):
+    if any(problem.line == line.number for problem in made.problems):
         return None
     if not given.text:
         made.wrong(line.number, given, f"{wanted.name} is missing", wanted.hint)
@@ -254,7 +254,7 @@ def _lines(text: str) -> list[SourceLine]:
     return numbered([line[: remark_at(line)].strip(BLANKS) for line in split_lines(text)])
 
 
-def compiled(lines: Sequence[SourceLine]) -> list[Placed]:
+def compiled(lines: Sequence[SourceLine]) -> list[PlacedLine]:
     """The lines of the memory. Raises Diagnostic for a program with errors, which `read` has reported."""
     made = assembled(lines)
     refuse(made.problems, "program")
@@ -267,29 +267,29 @@ def check(text: str, product: str = "") -> list[Problem]:
     unreadable = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(lines)]
     unreadable += check_enter(line[: remark_at(line)] for line in lines)
     made = assembled(numbered(lines))
-    marks = [each for n, line in enumerate(lines, 1) for each in check_comment(line, n, remark_at(line))]
-    wrong = {each.line for each in unreadable}
-    problems = [*unreadable, *(each for each in (*made.problems, *marks) if each.line not in wrong)]
+    marks = [problem for n, line in enumerate(lines, 1) for problem in check_comment(line, n, remark_at(line))]
+    wrong = {problem.line for problem in unreadable}
+    problems = [*unreadable, *(problem for problem in (*made.problems, *marks) if problem.line not in wrong)]
     if not made.lines and not errors(problems):  # as the backup of a module without one
         problems.append(Problem(1, 1, "holds no program", "a download of it leaves the module without one", True))
-    return in_order([*problems, *_warnings(made, {each.line for each in errors(problems)})])
+    return in_order([*problems, *_warnings(made, {error.line for error in errors(problems)})])
 
 
 def _warnings(made: Assembled, wrong: Container[int]) -> Iterator[Problem]:
     """Warn of what the correct lines do together. A line with an error may be any command."""
-    targets = {*made.labels.values(), *(each.call.value for each in made.lines if each.call.command in JUMPS)}
+    targets = {*made.labels.values(), *(line.call.value for line in made.lines if line.call.command in JUMPS)}
     dead = False
-    for each in made.lines:
-        dead = dead and each.at not in targets and each.source not in wrong
+    for line in made.lines:
+        dead = dead and line.at not in targets and line.source not in wrong
         if dead:
-            yield Problem(each.source, 1, "this line is never executed", "", True)
-        if each.call.command in WEARS:
-            what = f"{spelled(each.call)} writes to the EEPROM, which wears out, each time that it is executed"
-            yield Problem(each.source, 1, what, "", True)
-        if each.call.command in JUMPS and each.call.value > len(made.lines):
-            what = f"the program has no line {each.call.value}"
-            yield Problem(each.source, 1, what, f"its lines are 0 to {len(made.lines) - 1}", True)
-        dead = each.call.command in ENDS and each.source not in wrong
+            yield Problem(line.source, 1, "this line is never executed", "", True)
+        if line.call.command in WEARS:
+            what = f"{spelled(line.call)} writes to the EEPROM, which wears out, each time that it is executed"
+            yield Problem(line.source, 1, what, "", True)
+        if line.call.command in JUMPS and line.call.value > len(made.lines):
+            what = f"the program has no line {line.call.value}"
+            yield Problem(line.source, 1, what, f"its lines are 0 to {len(made.lines) - 1}", True)
+        dead = line.call.command in ENDS and line.source not in wrong
     if made.lines and made.lines[-1].call.command not in ENDS and made.lines[-1].source not in wrong:
         what = "the program runs on past this line, its last one"
         yield Problem(made.lines[-1].source, 1, what, "end it with STOP or JA", True)
@@ -298,7 +298,9 @@ def _warnings(made: Assembled, wrong: Container[int]) -> Iterator[Problem]:
 
 def _too_deep(made: Assembled) -> list[Problem]:
     """Warn of calls that a module ignores, as its stack is full: recursion, and nesting beyond its depth."""
-    calls = {each.at: each.call.value for each in made.lines if each.call.command in (Word.CSUB, Word.CALL)}
+    calls = {
+        line.at: line.call.value for line in made.lines if line.call.command in (ProgramWord.CSUB, ProgramWord.CALL)
+    }
     inside = {start: _calls_from(made, start, calls) for start in {0, *calls.values()}}
     depth, level = 0, {0}
     while level and depth <= STACK:
@@ -318,7 +320,11 @@ def _calls_from(made: Assembled, start: int, calls: Mapping[int, int]) -> set[in
             return []
         call = made.lines[at].call
         following = [at + 1] if call.command not in ENDS else []
-        return [*following, call.value] if call.command in (Word.JA, Word.JC, Word.DJNZ) else following
+        return (
+            [*following, call.value]
+            if call.command in (ProgramWord.JA, ProgramWord.JC, ProgramWord.DJNZ)
+            else following
+        )
 
     return walk([start], ways).keys() & calls.keys()
 
@@ -334,30 +340,30 @@ def formatted(text: str) -> str:
 
 def canonical(text: str) -> str:
     """A line in canonical spelling, without its remark: words in capitals, `, ` between fields, `Label: `."""
-    found = divided(text)
-    if found is None:
+    halves = divided(text)
+    if halves is None:
         return text.strip()
-    parts = [f"{found.label.text}:"] if found.label is not None else []
-    if found.name is not None and found.value is not None:
-        parts.append(f"{found.name.text} = {found.value.text}")
-    if found.word is not None:
-        row = fields_of(found.word.text)
-        known = row[1] if row is not None and len(row[1]) == len(found.fields) else ()
-        fields = [each.text for each in found.fields]
+    parts = [f"{halves.label.text}:"] if halves.label is not None else []
+    if halves.name is not None and halves.value is not None:
+        parts.append(f"{halves.name.text} = {halves.value.text}")
+    if halves.word is not None:
+        row = fields_of(halves.word.text)
+        known = row[1] if row is not None and len(row[1]) == len(halves.fields) else ()
+        fields = [each.text for each in halves.fields]
         for at, wanted in enumerate(known):
             fields[at] = fields[at].upper() if fields[at].upper() in wanted.words else fields[at]
-        parts.append(f"{found.word.text.upper() if row else found.word.text} {', '.join(fields)}".strip())
+        parts.append(f"{halves.word.text.upper() if row else halves.word.text} {', '.join(fields)}".strip())
     return " ".join(parts)
 
 
-def parts(line: str) -> list[Part]:
-    found, start = divided(line), remark_at(line)
-    marks: list[Part] = []
-    if found is not None:
-        for piece, kind in ((found.label, "label"), (found.name, "label"), (found.word, _kind(found))):
+def parts(line: str) -> list[LinePart]:
+    halves, start = divided(line), remark_at(line)
+    marks: list[LinePart] = []
+    if halves is not None:
+        for piece, kind in ((halves.label, "label"), (halves.name, "label"), (halves.word, _kind(halves))):
             if piece is not None and piece.text:
-                marks.append(Part(piece.column - 1, piece.column - 1 + len(piece.text), kind))
-    return [*marks, Part(start, len(line), "remark")] if start < len(line) else marks
+                marks.append(LinePart(piece.column - 1, piece.column - 1 + len(piece.text), kind))
+    return [*marks, LinePart(start, len(line), "remark")] if start < len(line) else marks
 
 
 def _kind(line: Divided) -> str:
@@ -371,15 +377,15 @@ def _kind(line: Divided) -> str:
     return "starts" if number != EMPTY and instructions.moves(call_with(number, fields, values)) else "word"
 
 
-def entries(text: str) -> list[Entry]:
+def entries(text: str) -> list[ProgramEntry]:
     """Its first line, and its labels: a host may run each of them by its address."""
     made = assembled(numbered(split_lines(text)))
-    found = [Entry("0", made.lines[0].source, run_at(0))] if made.lines else []
+    program_entries = [ProgramEntry("0", made.lines[0].source, run_at(0))] if made.lines else []
     for line in _lines(text):
-        label = each.label if (each := divided(line.text)) is not None else None
+        label = halves.label if (halves := divided(line.text)) is not None else None
         if label is not None and (at := made.labels[label.text.upper()]) < len(made.lines):
-            found.append(Entry(label.text, line.number, run_at(at)))
-    return found
+            program_entries.append(ProgramEntry(label.text, line.number, run_at(at)))
+    return program_entries
 
 
 def run_at(address: int) -> str:
@@ -390,18 +396,18 @@ def run_at(address: int) -> str:
 # Lines of a memory as a file
 
 
-def disassembled(held: Mapping[int, Call]) -> list[str]:
+def disassembled(held: Mapping[int, TmclCall]) -> list[str]:
     """The lines of a file that gives exactly this memory, with labels for the targets of jumps."""
     last = max(held, default=-1)
-    rows = [held.get(at, Call(EMPTY)) for at in range(last + 1)]
+    rows = [held.get(at, TmclCall(EMPTY)) for at in range(last + 1)]
     targets = {call.value for call in rows if call.command in JUMPS and 0 <= call.value <= last}
-    found = []
+    lines = []
     for at, call in enumerate(rows):
         if at in targets:
-            found.append(f"{label_of(at)}:")
+            lines.append(f"{label_of(at)}:")
         jumps = call.command in JUMPS and call.value in targets
-        found.append(f"    {spelled(call, label_of(call.value) if jumps else '')}")
-    return found
+        lines.append(f"    {spelled(call, label_of(call.value) if jumps else '')}")
+    return lines
 
 
 def label_of(address: int) -> str:

@@ -32,14 +32,14 @@ class Coordinates:
     def restore(self, number: int) -> None:
         """Copy a coordinate of every motor from EEPROM; 0: all."""
         for held, kept in zip(self._held, self._kept, strict=True):
-            for each in [number] if number else NUMBERS[1:]:
-                held[each] = kept[each]
+            for coordinate in [number] if number else NUMBERS[1:]:
+                held[coordinate] = kept[coordinate]
 
     def keep(self, number: int) -> None:
         """Copy a coordinate of every motor to EEPROM; 0: all."""
         for held, kept in zip(self._held, self._kept, strict=True):
-            for each in [number] if number else NUMBERS[1:]:
-                kept[each] = held[each]
+            for coordinate in [number] if number else NUMBERS[1:]:
+                kept[coordinate] = held[coordinate]
 
     def power_up(self) -> None:
         for held in self._held:

@@ -22,7 +22,7 @@ from multidrop.dialects.program_files import errors
 from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.families.tmcl.manual import program_file
-from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Global, Status, setting_name
+from multidrop.families.tmcl.manual.commands import AxisParameter, Command, Global, Status, TmclCall, setting_name
 from multidrop.families.tmcl.manual.instructions import spelled
 from multidrop.families.tmcl.manual.modules import (
     BAUDS,
@@ -33,7 +33,7 @@ from multidrop.families.tmcl.manual.modules import (
     Module,
     module_of,
 )
-from multidrop.families.tmcl.manual.parameters import Parameter
+from multidrop.families.tmcl.manual.parameters import TmclParameter
 from multidrop.families.tmcl.simulator.module import TmclModule, storable, worlds_of
 from multidrop.families.tmcl.simulator.motor import FULL
 from multidrop.simulator.cell.drive_keys import (
@@ -49,13 +49,13 @@ from multidrop.simulator.cell.drive_keys import (
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
-from multidrop.simulator.cell.writer import DriveText, Entry, remark
+from multidrop.simulator.cell.writer import CellEntry, DriveText, remark
 from multidrop.simulator.family import Effort, Place, Shadow, SimulatedFamily, StoredProgram, Unit
 from multidrop.simulator.wire import Port, Transmission
 
 VERSION_FORM = re.compile(r"\d{4}V\d{3}", re.ASCII)
 GLOBAL_PREFIX = "G"
-COUNTS = 4095
+ANALOG_FULL_SCALE = 4095
 """The end of scale of an analog input."""
 VARIABLES = tuple(map(str, USERS))
 FULL_STEPS = 200
@@ -64,8 +64,8 @@ FULL_STEPS = 200
 
 def _axis_scale(module: Module, settings: Mapping[str, Setting], name: str, scale: Scale | None) -> AxisScale:
     """A count is a microstep. A step of the world is 1/256 of a full step."""
-    word = f"{int(Axis.MICROSTEPS)}"
-    power = settings.get(word if name == "0" else f"{word}_{name}", module.axis[Axis.MICROSTEPS].fresh)
+    word = f"{int(AxisParameter.MICROSTEPS)}"
+    power = settings.get(word if name == "0" else f"{word}_{name}", module.axis[AxisParameter.MICROSTEPS].fresh)
     full_steps = (scale.full_steps if scale is not None else None) or FULL_STEPS
     return AxisScale(scale, Fraction(full_steps * FULL), Fraction(FULL, 2 ** int(str(power))))
 
@@ -99,13 +99,13 @@ def _check_setting(module: Module, table: Table, word: str, value: Setting) -> N
 NAME = re.compile(r"(G?)(0|[1-9]\d{0,2})(?:_([1-9]))?", re.ASCII)
 
 
-def _parameter(module: Module, word: str) -> Parameter | None:
+def _parameter(module: Module, word: str) -> TmclParameter | None:
     """The parameter that a key names, of those that EEPROM holds; the address has a key of its own."""
-    found = NAME.fullmatch(word)
-    if found is None or int(found[3] or 0) >= (1 if found[1] else module.motors):
+    match = NAME.fullmatch(word)
+    if match is None or int(match[3] or 0) >= (1 if match[1] else module.motors):
         return None
-    number = int(found[2])
-    if found[1]:
+    number = int(match[2])
+    if match[1]:
         row = module.banks[0].get(number)
         return row if row is not None and row.writable and number != Global.ADDRESS else None
     row = module.axis.get(number)
@@ -123,11 +123,11 @@ def _program(snapshot: Snapshot) -> list[str]:
     if snapshot.remarked and not errors(program_file.check("\n".join(snapshot.remarked))):
         return list(snapshot.remarked)
     made = program_file.assembled([SourceLine(number, text) for number, text in enumerate(held.values(), 1)])
-    return program_file.disassembled(dict(zip(held, (each.call for each in made.lines), strict=True)))
+    return program_file.disassembled(dict(zip(held, (line.call for line in made.lines), strict=True)))
 
 
 LENGTH = 9
-PAUSE = 0.5
+FRAME_TIMEOUT = 0.5
 """Seconds of silence after which an unfinished message is dropped."""
 REQUEST = Struct(">BBBBi")
 REPLY = Struct(">BBBBi")
@@ -149,14 +149,14 @@ class TmclPort(Port):
 
     @property
     def deadline(self) -> float | None:
-        times = (self._device.deadline, *(each.at for each in self._out))
+        times = (self._device.deadline, *(transmission.at for transmission in self._out))
         return min((at for at in times if at is not None), default=None)
 
     def receive(self, data: bytes, now: float) -> None:
         if not self._device.powered:
             self._message.clear()
             return
-        if now - self._heard_at > PAUSE:
+        if now - self._heard_at > FRAME_TIMEOUT:
             self._message.clear()
         self._heard_at = now
         for byte in data:
@@ -170,8 +170,8 @@ class TmclPort(Port):
         self._device.advance(now)
         for at, motors in self._device.notices():
             self._say(at, self._frame(Status.TARGET_REACHED, Command.NOTIFY, motors))
-        due = [each for each in self._out if each.at <= now]
-        self._out = [each for each in self._out if each.at > now]
+        due = [transmission for transmission in self._out if transmission.at <= now]
+        self._out = [transmission for transmission in self._out if transmission.at > now]
         return due
 
     def _take(self, message: bytes, now: float) -> None:
@@ -184,7 +184,7 @@ class TmclPort(Port):
         if sum(message[:-1]) % 256 != message[-1]:
             self._say(now, self._frame(Status.WRONG_CHECKSUM, command, 0))
             return
-        answer = self._device.execute(Call(command, kind, motor, value), now)
+        answer = self._device.execute(TmclCall(command, kind, motor, value), now)
         if answer is None:
             return
         if answer.text:
@@ -213,7 +213,7 @@ def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
 
     def motion(now: float) -> tuple[Motion, ...]:
         return tuple(
-            Motion(motor.read(Axis.ACTUAL_POSITION, now), motor.read(Axis.ACTUAL_VELOCITY, now), name)
+            Motion(motor.read(AxisParameter.ACTUAL_POSITION, now), motor.read(AxisParameter.ACTUAL_VELOCITY, now), name)
             for name, motor in motors.items()
         )
 
@@ -260,7 +260,7 @@ class SimulatedTmcl(SimulatedFamily):
             name: _axis_scale(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names
         }
         surroundings = table.table("world", "[bus.drive.world]")
-        world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, geared)
+        world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), ANALOG_FULL_SCALE, geared)
         identity = read_identity(table, ("version",), {"position": module.motors, "target": module.motors})
         if identity.version and not VERSION_FORM.fullmatch(identity.version):
             hint = "valid: module and firmware, as in 1241V115"
@@ -290,7 +290,7 @@ class SimulatedTmcl(SimulatedFamily):
             port=TmclPort(device, any_baud=place.baud not in BAUDS.values()),
             worlds=dict(zip(names, worlds, strict=True)),
             inputs=inputs_of(device.table),
-            counts=COUNTS,
+            counts=ANALOG_FULL_SCALE,
             shadow=_shadow(device, names),
             single_supply=True,
         )
@@ -299,22 +299,22 @@ class SimulatedTmcl(SimulatedFamily):
     def describe(cls, snapshot: Snapshot) -> DriveText:
         personality = _canonical(snapshot.product if snapshot.product.removeprefix(f"{PREFIX}-") in MODULES else PREFIX)
         module = module_of(personality)
-        readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
-        held = [each for each in readings if _parameter(module, each.name) is not None]
+        readings = [reading for reading in snapshot.readings.readings if reading.name != ADDRESS]
+        held = [reading for reading in readings if _parameter(module, reading.name) is not None]
         counters = {key: counts[: module.motors] for key, counts in snapshot.counters.items()}
         return DriveText(
             personality=personality,
             name=snapshot.name,
             remarks=[
                 *snapshot.remarks,
-                *(f"not in set: {each.name} = {each.value}" for each in readings if each not in held),
+                *(f"not in set: {reading.name} = {reading.value}" for reading in readings if reading not in held),
             ],
             unread=snapshot.readings.unread,
             program=_program(snapshot),
-            settings=[Entry(each.name, each.value, remark(each)) for each in held],
+            settings=[CellEntry(reading.name, reading.value, remark(reading)) for reading in held],
             identity=[
-                *([Entry("version", snapshot.version)] if snapshot.version else []),
-                *(Entry(key, list(counts) if module.motors > 1 else counts[0]) for key, counts in counters.items()),
+                *([CellEntry("version", snapshot.version)] if snapshot.version else []),
+                *(CellEntry(key, list(counts) if module.motors > 1 else counts[0]) for key, counts in counters.items()),
             ],
             baud=snapshot.baud,
         )
@@ -331,5 +331,5 @@ class SimulatedTmcl(SimulatedFamily):
         if not spec.program:
             return StoredProgram()
         lines = program_file.compiled(program_file.read(spec.program, spec.program_name))
-        listed = tuple(f"{each.at}  {spelled(each.call)}" for each in lines)
+        listed = tuple(f"{line.at}  {spelled(line.call)}" for line in lines)
         return StoredProgram(listed, tuple(split_lines(spec.program.strip("\n"))))

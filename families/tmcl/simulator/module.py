@@ -13,23 +13,23 @@ from math import inf
 
 from multidrop.families.tmcl.manual.commands import (
     FACTORY_CODE,
-    Axis,
-    Call,
+    AxisParameter,
     Command,
     Global,
-    Move,
-    Running,
-    Search,
+    MoveType,
+    ProgramStatus,
+    SearchAction,
     Status,
+    TmclCall,
     Version,
 )
-from multidrop.families.tmcl.manual.instructions import CONTROL, MEMORY, Wait, Word
+from multidrop.families.tmcl.manual.instructions import CONTROL, MEMORY, ProgramWord, Wait
 from multidrop.families.tmcl.manual.modules import BAUDS, GLOBAL, TEMPERATURE, VOLTAGE, module_of
-from multidrop.families.tmcl.manual.parameters import TARGETS, Parameter
+from multidrop.families.tmcl.manual.parameters import TARGETS, TmclParameter
 from multidrop.families.tmcl.manual.program_file import compiled, read
 from multidrop.families.tmcl.simulator.coordinates import EVERY_MOTOR, NUMBERS, Coordinates
-from multidrop.families.tmcl.simulator.motor import Motor
-from multidrop.families.tmcl.simulator.program import Program
+from multidrop.families.tmcl.simulator.motor import TmclMotor
+from multidrop.families.tmcl.simulator.program import TmclProgram
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.world import World
 
@@ -46,16 +46,16 @@ REACHED_INTERRUPT, LEFT_INTERRUPT, RIGHT_INTERRUPT, INPUT_INTERRUPT = 3, 27, 28,
 
 
 @dataclass(frozen=True)
-class Answer:
+class ModuleReply:
     """What the module replies with; `text` or a stored line in place of a frame's fields."""
 
     status: Status = Status.DONE
     value: int = 0
     text: str = ""
-    line: Call | None = None
+    line: TmclCall | None = None
 
 
-class Refused(Exception):
+class ModuleRefusal(Exception):
     """The module refuses a command; nothing was changed."""
 
     def __init__(self, status: Status) -> None:
@@ -65,7 +65,7 @@ class Refused(Exception):
 def worlds_of(spec: DriveSpec) -> list[World]:
     """The surroundings of each motor of a module."""
     given = (spec.world, *spec.further)
-    return [World(each) for each in (*given, *[WorldSpec()] * (module_of(spec.personality).motors - len(given)))]
+    return [World(world) for world in (*given, *[WorldSpec()] * (module_of(spec.personality).motors - len(given)))]
 
 
 class TmclModule:
@@ -77,12 +77,12 @@ class TmclModule:
         self.powered = False
         self.any_address = spec.any_address
         """It replies to every address, 0 included."""
-        self.motors = [Motor(world, self.table) for world in worlds]
+        self.motors = [TmclMotor(world, self.table) for world in worlds]
 
-        self.program = Program(self.carry_out, self._waited, self._signals)
+        self.program = TmclProgram(self.carry_out, self._waited, self._signals)
         if spec.program:
             name = spec.program_name or "program"
-            self.program.load({each.at: each.call for each in compiled(read(spec.program, name))})
+            self.program.load({line.at: line.call for line in compiled(read(spec.program, name))})
         self._version_text = spec.identity.version or self.table.version
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
@@ -144,16 +144,16 @@ class TmclModule:
         self._now = max(self._now, now)
         self._live(self._now)
 
-    def execute(self, call: Call, now: float) -> Answer | None:
+    def execute(self, call: TmclCall, now: float) -> ModuleReply | None:
         """Carry out a command of a host; its reply, or None where it gives none."""
         self.advance(now)
         self._heard = now
         if self.program.storing and call.command < CONTROL:
-            return Answer(Status.STORED if self.program.store(call) else Status.MAXIMUM_EXCEEDED, call.value)
+            return ModuleReply(Status.STORED if self.program.store(call) else Status.MAXIMUM_EXCEEDED, call.value)
         try:
             answer = self._execute(call, now)
-        except Refused as refused:
-            return Answer(refused.status, call.value)
+        except ModuleRefusal as refused:
+            return ModuleReply(refused.status, call.value)
         self._live(now)
         return answer
 
@@ -185,15 +185,15 @@ class TmclModule:
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
 
-    def carry_out(self, call: Call, now: float) -> tuple[int, int]:
+    def carry_out(self, call: TmclCall, now: float) -> tuple[int, int]:
         """Carry out a command of the direct mode as a line of the program; its status and value."""
         try:
             answer = self._execute(call, now)
-        except Refused as refused:
+        except ModuleRefusal as refused:
             return refused.status, 0
         return Status.DONE, answer.value if answer is not None else 0
 
-    def _waited(self, call: Call, now: float) -> bool:
+    def _waited(self, call: TmclCall, now: float) -> bool:
         """Whether what a WAIT waits for has come."""
         if call.motor >= len(self.motors):
             return True
@@ -209,58 +209,58 @@ class TmclModule:
 
     def _signals(self, now: float) -> dict[int, bool]:
         """The states whose beginning is an interrupt, by its number."""
-        found = {INPUT_INTERRUPT + port: bool(level) for port, level in self._inputs(now).items()}
+        signals = {INPUT_INTERRUPT + port: bool(level) for port, level in self._inputs(now).items()}
         for n, motor in enumerate(self.motors):
             _, right, left = motor.shaft.switches(now)
-            found[REACHED_INTERRUPT + n] = motor.positioning and motor.reached(now)
-            found |= {LEFT_INTERRUPT + 2 * n: left, RIGHT_INTERRUPT + 2 * n: right}
-        return found
+            signals[REACHED_INTERRUPT + n] = motor.positioning and motor.reached(now)
+            signals |= {LEFT_INTERRUPT + 2 * n: left, RIGHT_INTERRUPT + 2 * n: right}
+        return signals
 
-    def _execute(self, call: Call, now: float) -> Answer | None:
+    def _execute(self, call: TmclCall, now: float) -> ModuleReply | None:
         match call.command:
             case Command.VERSION:
                 if call.type == Version.TEXT:
-                    return Answer(text=self._version_text)
+                    return ModuleReply(text=self._version_text)
                 if (
                     call.type == Version.BINARY
                 ):  # the module in the upper half, then both parts of the firmware's number
                     module, _, firmware = self._version_text.partition("V")
-                    return Answer(value=int(module) << 16 | int(firmware[0]) << 8 | int(firmware[1:]))
-                raise Refused(Status.WRONG_TYPE)
+                    return ModuleReply(value=int(module) << 16 | int(firmware[0]) << 8 | int(firmware[1:]))
+                raise ModuleRefusal(Status.WRONG_TYPE)
             case Command.FACTORY:
                 if call.value != FACTORY_CODE:
-                    raise Refused(Status.INVALID_VALUE)
+                    raise ModuleRefusal(Status.INVALID_VALUE)
                 self._fresh()
                 self.power(False, now)
                 self.power(True, now)
                 return None
             case Command.SGP | Command.GGP | Command.STGP | Command.RSGP:
-                return Answer(value=self._global_parameter(call, now))
+                return ModuleReply(value=self._global_parameter(call, now))
             case Command.SIO | Command.GIO:
-                return Answer(value=self._port(call, now))
-            case Word.SCO | Word.GCO | Word.CCO:
-                return Answer(value=self._coordinate(call, now))
+                return ModuleReply(value=self._port(call, now))
+            case ProgramWord.SCO | ProgramWord.GCO | ProgramWord.CCO:
+                return ModuleReply(value=self._coordinate(call, now))
         if call.command not in tuple(Command):
-            raise Refused(Status.INVALID_COMMAND)
+            raise ModuleRefusal(Status.INVALID_COMMAND)
         if call.command == Command.READ_PROGRAM:
             if call.value not in range(MEMORY):
-                raise Refused(Status.INVALID_VALUE)
-            return Answer(line=self.program.line(call.value))
+                raise ModuleRefusal(Status.INVALID_VALUE)
+            return ModuleReply(line=self.program.line(call.value))
         if call.command in range(Command.STOP_PROGRAM, Command.VERSION):
-            return Answer(value=self._program_command(call, now))
+            return ModuleReply(value=self._program_command(call, now))
         if call.command == Command.NOTIFY:  # when motors reach their targets (command 138)
             if call.value not in range(1 << len(self.motors)):
-                raise Refused(Status.INVALID_VALUE)
+                raise ModuleRefusal(Status.INVALID_VALUE)
             self._notify = call.value
-            return Answer(value=call.value)
+            return ModuleReply(value=call.value)
         if call.motor >= len(self.motors):
-            raise Refused(self.table.wrong_motor)
-        return Answer(value=self._motor_command(self.motors[call.motor], call, now))
+            raise ModuleRefusal(self.table.wrong_motor)
+        return ModuleReply(value=self._motor_command(self.motors[call.motor], call, now))
 
-    def _program_command(self, call: Call, now: float) -> int:
+    def _program_command(self, call: TmclCall, now: float) -> int:
         program = self.program
         if program.storing and call.command in (Command.RUN, Command.STEP):
-            raise Refused(Status.NOT_AVAILABLE)
+            raise ModuleRefusal(Status.NOT_AVAILABLE)
         match call.command:
             case Command.STOP_PROGRAM | Command.RESET_PROGRAM:
                 program.halt(reset=call.command == Command.RESET_PROGRAM)
@@ -273,40 +273,40 @@ class TmclModule:
             case Command.END_DOWNLOAD:
                 program.storing = False
             case Command.PROGRAM_STATUS:
-                mode = Running.STORES if program.storing else int(program.running)
+                mode = ProgramStatus.STORES if program.storing else int(program.running)
                 place = mode << 24 | int(program.waiting) << 16 | program.counter
                 states = (mode, place, program.accumulator, program.x)
                 if call.type not in range(len(states)):
-                    raise Refused(Status.WRONG_TYPE)
+                    raise ModuleRefusal(Status.WRONG_TYPE)
                 return states[call.type]
         return call.value
 
-    def _motor_command(self, motor: Motor, call: Call, now: float) -> int:
+    def _motor_command(self, motor: TmclMotor, call: TmclCall, now: float) -> int:
         """Carry out a command for a motor; the value of its reply."""
         match call.command:
             case Command.ROR | Command.ROL:
                 velocity = call.value if call.command == Command.ROR else -call.value
-                self._start(motor, Axis.TARGET_VELOCITY, velocity, now)
+                self._start(motor, AxisParameter.TARGET_VELOCITY, velocity, now)
             case Command.MST:
-                self._start(motor, Axis.TARGET_VELOCITY, 0, now)
+                self._start(motor, AxisParameter.TARGET_VELOCITY, 0, now)
             case Command.MVP:
-                if call.type not in tuple(Move):
-                    raise Refused(Status.WRONG_TYPE)
-                if call.type == Move.COORD and call.value not in NUMBERS:
-                    raise Refused(Status.INVALID_VALUE)
+                if call.type not in tuple(MoveType):
+                    raise ModuleRefusal(Status.WRONG_TYPE)
+                if call.type == MoveType.COORD and call.value not in NUMBERS:
+                    raise ModuleRefusal(Status.INVALID_VALUE)
                 motor.end_search()
-                if call.type == Move.COORD:
+                if call.type == MoveType.COORD:
                     motor.go(self._coordinates.of(call.motor, call.value), now)
                     return call.value
-                if call.type == Move.REL:
+                if call.type == MoveType.REL:
                     motor.go_by(call.value, now)
-                    return motor.read(Axis.TARGET_POSITION, now)
+                    return motor.read(AxisParameter.TARGET_POSITION, now)
                 motor.go(call.value, now)
-            case Command.RFS if call.type not in tuple(Search):
-                raise Refused(Status.WRONG_TYPE)
-            case Command.RFS if call.type == Search.STATUS:
+            case Command.RFS if call.type not in tuple(SearchAction):
+                raise ModuleRefusal(Status.WRONG_TYPE)
+            case Command.RFS if call.type == SearchAction.STATUS:
                 return motor.search.number if motor.search is not None else 0
-            case Command.RFS if call.type == Search.START:
+            case Command.RFS if call.type == SearchAction.START:
                 motor.seek(now)
             case Command.RFS if motor.search is not None:
                 motor.end_search()
@@ -317,47 +317,47 @@ class TmclModule:
                 return self._axis_parameter(motor, call, now)
         return call.value
 
-    def _coordinate(self, call: Call, now: float) -> int:
+    def _coordinate(self, call: TmclCall, now: float) -> int:
         """Set, read or take a coordinate; motor 255 of SCO and GCO: copy from or to EEPROM."""
         if call.type not in NUMBERS:
-            raise Refused(Status.WRONG_TYPE)
-        if call.motor == EVERY_MOTOR and call.command == Word.SCO:
+            raise ModuleRefusal(Status.WRONG_TYPE)
+        if call.motor == EVERY_MOTOR and call.command == ProgramWord.SCO:
             self._coordinates.restore(call.type)
             return call.value
-        if call.motor == EVERY_MOTOR and call.command == Word.GCO:
+        if call.motor == EVERY_MOTOR and call.command == ProgramWord.GCO:
             self._coordinates.keep(call.type)
             return call.value
         if call.motor >= len(self.motors):
-            raise Refused(self.table.wrong_motor)
-        if call.command == Word.GCO:
+            raise ModuleRefusal(self.table.wrong_motor)
+        if call.command == ProgramWord.GCO:
             return self._coordinates.of(call.motor, call.type)
-        position = call.value if call.command == Word.SCO else self.motors[call.motor].position(now)
+        position = call.value if call.command == ProgramWord.SCO else self.motors[call.motor].position(now)
         self._coordinates.set(call.motor, call.type, position, lasting=bool(self._global.get(Global.COORDINATES)))
         return call.value
 
-    def _start(self, motor: Motor, parameter: Axis, value: int, now: float) -> None:
+    def _start(self, motor: TmclMotor, parameter: AxisParameter, value: int, now: float) -> None:
         """Set a parameter that starts a motion; it ends a reference search."""
         _in_range(self.table.axis[parameter], value)
         motor.end_search()
         motor.write(parameter, value, now)
 
-    def _axis_parameter(self, motor: Motor, call: Call, now: float) -> int:
+    def _axis_parameter(self, motor: TmclMotor, call: TmclCall, now: float) -> int:
         row = self.table.axis.get(call.type)
         if row is None:
-            raise Refused(Status.WRONG_TYPE)
+            raise ModuleRefusal(Status.WRONG_TYPE)
         match call.command:
             case Command.GAP:
                 return motor.read(call.type, now)
             case Command.SAP:
                 if not row.writable:
-                    raise Refused(Status.WRONG_TYPE)
+                    raise ModuleRefusal(Status.WRONG_TYPE)
                 _in_range(row, call.value)
                 if call.type in TARGETS:
                     motor.end_search()
                 motor.write(call.type, call.value, now)
                 return call.value
         if not storable(call.type, row):
-            raise Refused(Status.WRONG_TYPE)
+            raise ModuleRefusal(Status.WRONG_TYPE)
         stored = self._axis[call.motor]
         if call.command == Command.STAP:
             stored[call.type] = motor.parameters[call.type]
@@ -365,12 +365,12 @@ class TmclModule:
             motor.write(call.type, stored[call.type], now)
         return call.value
 
-    def _global_parameter(self, call: Call, now: float) -> int:
+    def _global_parameter(self, call: TmclCall, now: float) -> int:
         if call.motor > max(self.table.banks):
-            raise Refused(Status.INVALID_VALUE)
+            raise ModuleRefusal(Status.INVALID_VALUE)
         row = self.table.banks.get(call.motor, {}).get(call.type)
         if row is None or (call.command == Command.SGP and not row.writable):
-            raise Refused(Status.WRONG_TYPE)
+            raise ModuleRefusal(Status.WRONG_TYPE)
         held = {0: self._global, USER_BANK: self._variables}.get(call.motor, self._interrupts)
         match call.command:
             case Command.SGP:
@@ -391,13 +391,13 @@ class TmclModule:
                 held[call.type] = self._kept_variables.get(call.type, 0)
         return call.value
 
-    def _port(self, call: Call, now: float) -> int:
+    def _port(self, call: TmclCall, now: float) -> int:
         """Set an output, or read a port."""
         if call.motor not in (DIGITAL, ANALOG, OUTPUTS) or (call.command == Command.SIO and call.motor != OUTPUTS):
-            raise Refused(Status.INVALID_VALUE)
+            raise ModuleRefusal(Status.INVALID_VALUE)
         if call.motor == ANALOG:
             if call.type not in self.table.analog:
-                raise Refused(Status.WRONG_TYPE)
+                raise ModuleRefusal(Status.WRONG_TYPE)
             if call.type in (VOLTAGE, TEMPERATURE):
                 return VOLTS if call.type == VOLTAGE else DEGREES
             return self.worlds[self.table.analog.index(call.type)].analog(now)
@@ -408,7 +408,7 @@ class TmclModule:
             self._outputs = {port: call.value >> port & 1 for port in ports}
             return call.value
         if call.type not in ports:
-            raise Refused(Status.WRONG_TYPE)
+            raise ModuleRefusal(Status.WRONG_TYPE)
         if call.command == Command.GIO:
             return ports[call.type]
         _in_range(OUTPUT, call.value)
@@ -447,17 +447,17 @@ class TmclModule:
         self.program.live(t)
 
 
-OUTPUT = Parameter("level of an output", range(2))
+OUTPUT = TmclParameter("level of an output", range(2))
 
 
-def storable(number: int, row: Parameter) -> bool:
+def storable(number: int, row: TmclParameter) -> bool:
     """Whether EEPROM holds an axis parameter."""
-    return row.writable and number > Axis.TARGET_VELOCITY
+    return row.writable and number > AxisParameter.TARGET_VELOCITY
 
 
-def _in_range(row: Parameter, value: int) -> None:
+def _in_range(row: TmclParameter, value: int) -> None:
     if value not in row.limits:
-        raise Refused(Status.INVALID_VALUE)
+        raise ModuleRefusal(Status.INVALID_VALUE)
 
 
 def _wrapped(value: int) -> int:

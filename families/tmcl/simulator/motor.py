@@ -18,10 +18,10 @@ from collections.abc import Iterator
 from math import inf
 from typing import NamedTuple
 
-from multidrop.families.tmcl.manual.commands import Axis
+from multidrop.families.tmcl.manual.commands import AxisParameter
 from multidrop.families.tmcl.manual.modules import INVERTED, MIRRORED, Module
 from multidrop.families.tmcl.manual.parameters import RAMPS
-from multidrop.simulator.kinematics import Effort, Pace, halt, move, slew
+from multidrop.simulator.kinematics import Effort, MotionPace, halt, move, slew
 from multidrop.simulator.world import REVOLUTION, Shaft, World
 
 FULL = 256
@@ -36,7 +36,7 @@ FROM_TARGET = 0
 """The value of parameter 127 with which MVP REL counts from the last target."""
 
 
-class Motor:
+class TmclMotor:
     """One motor. Times are seconds, positions microsteps. `positioning`: it aims at a position, else at a velocity."""
 
     def __init__(self, world: World, module: Module) -> None:
@@ -53,21 +53,21 @@ class Motor:
     def read(self, number: int, t: float) -> int:
         home, right, left = self.shaft.switches(t)
         measured = {
-            Axis.TARGET_POSITION: self._target,
-            Axis.ACTUAL_POSITION: self.position(t),
-            Axis.ACTUAL_VELOCITY: round(self._profile.velocity(t) / self._units[0]),
-            Axis.POSITION_REACHED: int(self.reached(t)),
-            Axis.HOME_SWITCH: int(home),
-            Axis.RIGHT_SWITCH: int(right),
-            Axis.LEFT_SWITCH: int(left),
-            Axis.LOAD: round(FREE * (1 - self.shaft.used(t))) if self.moving(t) and self.shaft.factor else 0,
+            AxisParameter.TARGET_POSITION: self._target,
+            AxisParameter.ACTUAL_POSITION: self.position(t),
+            AxisParameter.ACTUAL_VELOCITY: round(self._profile.velocity(t) / self._units[0]),
+            AxisParameter.POSITION_REACHED: int(self.reached(t)),
+            AxisParameter.HOME_SWITCH: int(home),
+            AxisParameter.RIGHT_SWITCH: int(right),
+            AxisParameter.LEFT_SWITCH: int(left),
+            AxisParameter.LOAD: round(FREE * (1 - self.shaft.used(t))) if self.moving(t) and self.shaft.factor else 0,
         }
-        return measured[Axis(number)] if number in measured else self.parameters[number]
+        return measured[AxisParameter(number)] if number in measured else self.parameters[number]
 
     @property
     def effort(self) -> Effort:
-        turn = REVOLUTION / FULL * 2 ** self.parameters[Axis.MICROSTEPS]
-        fastest = max((abs(each.velocity) for each in self._profile.segments), default=0.0)
+        turn = REVOLUTION / FULL * 2 ** self.parameters[AxisParameter.MICROSTEPS]
+        fastest = max((abs(segment.velocity) for segment in self._profile.segments), default=0.0)
         stalls = 0 < self._stall_speed <= fastest
         return Effort(self._profile, turn, current=self.shaft.current, stalls=stalls)
 
@@ -83,15 +83,15 @@ class Motor:
 
     def write(self, number: int, value: int, t: float) -> None:
         """Set an axis parameter; the value is in range."""
-        if number == Axis.TARGET_POSITION:
+        if number == AxisParameter.TARGET_POSITION:
             self.go(value, t)
-        elif number == Axis.TARGET_VELOCITY:
+        elif number == AxisParameter.TARGET_VELOCITY:
             self.rotate(value, t)
-        elif number == Axis.ACTUAL_POSITION:
+        elif number == AxisParameter.ACTUAL_POSITION:
             self._follow_from(float(value), self._profile.velocity(t), t)  # here; on its way to a target it moves on
         else:
             self.parameters[number] = value
-            if number in (Axis.MICROSTEPS, Axis.RUN_CURRENT):
+            if number in (AxisParameter.MICROSTEPS, AxisParameter.RUN_CURRENT):
                 self._hand_on(t)
             elif number in RAMPS and (self.moving(t) or (self.positioning and not self.reached(t))):
                 self._plan(t)
@@ -102,13 +102,13 @@ class Motor:
 
     def go_by(self, distance: int, t: float) -> None:
         """Move by a distance from the last target, or from here, as parameter 127 says."""
-        here = self.parameters.get(Axis.RELATIVE_FROM, FROM_TARGET) != FROM_TARGET
+        here = self.parameters.get(AxisParameter.RELATIVE_FROM, FROM_TARGET) != FROM_TARGET
         self.go((self.position(t) if here else self._target) + distance, t)
 
     def rotate(self, velocity: int, t: float) -> None:
         """Turn at a velocity, and on; 0 slows down to rest."""
         self.positioning = False
-        self.parameters[Axis.TARGET_VELOCITY] = velocity
+        self.parameters[AxisParameter.TARGET_VELOCITY] = velocity
         self._plan(t)
 
     def stand_at(self, position: int, t: float, target: int | None = None) -> None:
@@ -130,7 +130,7 @@ class Motor:
     def freeze(self, t: float) -> None:
         """Stand at once, without a ramp."""
         self.positioning = False
-        self.parameters[Axis.TARGET_VELOCITY] = 0
+        self.parameters[AxisParameter.TARGET_VELOCITY] = 0
         self._profile = halt(t, float(round(self._profile.position(t))))
         self._hand_on(t)
 
@@ -139,19 +139,22 @@ class Motor:
         self.shaft.powered = on
         self.end_search()
         self.stand_at(0, t)
-        self.parameters[Axis.TARGET_VELOCITY] = 0
+        self.parameters[AxisParameter.TARGET_VELOCITY] = 0
 
     def events(self, after: float) -> Iterator[float]:
         yield from self.shaft.events(after)
         if self.moving(after) and self._profile.end < inf:
             yield self._profile.end
         if self._stall_speed and not self.shaft.factor:  # when it becomes that fast
-            for each in self._profile.segments:
-                if each.acceleration:
-                    yield each.start + (self._stall_speed * each.direction - each.velocity) / each.acceleration
+            for segment in self._profile.segments:
+                if segment.acceleration:
+                    yield (
+                        segment.start
+                        + (self._stall_speed * segment.direction - segment.velocity) / segment.acceleration
+                    )
 
     def seek(self, t: float) -> None:
-        self.search = ReferenceSearch(self, self.parameters[Axis.SEARCH_MODE], t)
+        self.search = ReferenceSearch(self, self.parameters[AxisParameter.SEARCH_MODE], t)
 
     def end_search(self) -> None:
         self.search, self.passes_limits = None, False
@@ -168,14 +171,14 @@ class Motor:
     @property
     def _stall_speed(self) -> float:
         """From this velocity on a stall stops it, microsteps/s; 0: never."""
-        return self.parameters.get(Axis.STALL_VELOCITY, 0) * self._units[0]
+        return self.parameters.get(AxisParameter.STALL_VELOCITY, 0) * self._units[0]
 
     @property
     def _units(self) -> tuple[float, float]:
         """A unit of velocity in microsteps/s, and one of acceleration in microsteps/s2."""
         if not self._chip_units:
             return 1.0, 1.0
-        pulse, ramp = self.parameters[Axis.PULSE_DIVISOR], self.parameters[Axis.RAMP_DIVISOR]
+        pulse, ramp = self.parameters[AxisParameter.PULSE_DIVISOR], self.parameters[AxisParameter.RAMP_DIVISOR]
         return CLOCK / (2**pulse * 2048 * 32), CLOCK**2 / 2 ** (pulse + ramp + 29)
 
     def _blocked(self, way: float, t: float) -> bool:
@@ -183,18 +186,18 @@ class Motor:
             return False
         _, right, left = self.shaft.switches(t)
         if way > 0:
-            return right and not self.parameters[Axis.RIGHT_LIMIT_OFF]
-        return left and not self.parameters[Axis.LEFT_LIMIT_OFF]
+            return right and not self.parameters[AxisParameter.RIGHT_LIMIT_OFF]
+        return left and not self.parameters[AxisParameter.LEFT_LIMIT_OFF]
 
     def _plan(self, t: float) -> None:
         self._follow_from(self._profile.position(t), self._profile.velocity(t), t)
 
     def _follow_from(self, position: float, velocity: float, t: float) -> None:
         of_velocity, of_rate = self._units
-        rate = max(1, self.parameters[Axis.MAXIMUM_ACCELERATION]) * of_rate
-        pace = Pace(0.0, self.parameters[Axis.MAXIMUM_VELOCITY] * of_velocity, rate, rate)
+        rate = max(1, self.parameters[AxisParameter.MAXIMUM_ACCELERATION]) * of_rate
+        pace = MotionPace(0.0, self.parameters[AxisParameter.MAXIMUM_VELOCITY] * of_velocity, rate, rate)
         if not self.positioning or not pace.vm:
-            wanted = 0 if self.positioning else self.parameters[Axis.TARGET_VELOCITY]
+            wanted = 0 if self.positioning else self.parameters[AxisParameter.TARGET_VELOCITY]
             self._profile = slew(t, position, velocity, wanted * of_velocity, pace)
         else:
             here = round(position)
@@ -206,8 +209,8 @@ class Motor:
             self._hand_on(t)
 
     def _hand_on(self, t: float) -> None:
-        self.shaft.scale = FULL / 2 ** self.parameters[Axis.MICROSTEPS]
-        self.shaft.current = min(1.0, self.parameters[Axis.RUN_CURRENT] / FULL_CURRENT)
+        self.shaft.scale = FULL / 2 ** self.parameters[AxisParameter.MICROSTEPS]
+        self.shaft.current = min(1.0, self.parameters[AxisParameter.RUN_CURRENT] / FULL_CURRENT)
         self.shaft.follow(self._profile, t)
 
 
@@ -220,24 +223,27 @@ HOME, RIGHT, LEFT = 0, 1, 2
 """Places in what `Shaft.switches` gives."""
 
 
-class Step(NamedTuple):
+class SearchStep(NamedTuple):
     """Turn, to the right with 1 and to the left with -1, until a switch is closed or open."""
 
     way: int
     switch: int
     closed: bool = True
-    speed: Axis = Axis.SEARCH_SPEED
+    speed: AxisParameter = AxisParameter.SEARCH_SPEED
 
 
-TO_RIGHT, TO_LEFT = Step(1, RIGHT), Step(-1, LEFT)
-OFF_LEFT, INTO_LEFT = Step(1, LEFT, False, Axis.SWITCH_SPEED), Step(-1, LEFT, True, Axis.SWITCH_SPEED)
+TO_RIGHT, TO_LEFT = SearchStep(1, RIGHT), SearchStep(-1, LEFT)
+OFF_LEFT, INTO_LEFT = (
+    SearchStep(1, LEFT, False, AxisParameter.SWITCH_SPEED),
+    SearchStep(-1, LEFT, True, AxisParameter.SWITCH_SPEED),
+)
 
 
-def _home(way: int) -> tuple[Step, ...]:
-    return Step(way, HOME), Step(-way, HOME, False, Axis.SWITCH_SPEED)
+def _home(way: int) -> tuple[SearchStep, ...]:
+    return SearchStep(way, HOME), SearchStep(-way, HOME, False, AxisParameter.SWITCH_SPEED)
 
 
-ROUTES: dict[int, tuple[Step, ...]] = {
+ROUTES: dict[int, tuple[SearchStep, ...]] = {
     1: (TO_LEFT, OFF_LEFT),
     2: (TO_RIGHT, TO_LEFT, OFF_LEFT),
     3: (TO_RIGHT, TO_LEFT, OFF_LEFT, INTO_LEFT),
@@ -257,14 +263,14 @@ PASSING = (7, 8)
 class ReferenceSearch:
     """One search of a motor. `number` is that of its step, from 1: what RFS STATUS replies with."""
 
-    def __init__(self, motor: Motor, mode: int, t: float) -> None:
+    def __init__(self, motor: TmclMotor, mode: int, t: float) -> None:
         self._motor = motor
         self._inverted = bool(mode & INVERTED)
         base = mode % MIRRORED
         self._turn = TURNS.get(base)
         self._steps = list(ROUTES[base])
         if mode & MIRRORED:
-            self._steps = [each._replace(way=-each.way, switch=RIGHT + LEFT - each.switch) for each in self._steps]
+            self._steps = [step._replace(way=-step.way, switch=RIGHT + LEFT - step.switch) for step in self._steps]
         self._ends: list[int] = []
         """Where the end switches were closed."""
         self.number = 0
@@ -293,7 +299,7 @@ class ReferenceSearch:
                 self._enter(t)
         return True
 
-    def _at(self, step: Step, t: float) -> bool:
+    def _at(self, step: SearchStep, t: float) -> bool:
         closed = self._motor.shaft.switches(t)[step.switch]
         return (closed is not self._inverted if step.switch == HOME else closed) is step.closed
 
@@ -301,12 +307,12 @@ class ReferenceSearch:
         """End a step; after the last one the motor stands at position 0."""
         motor, step = self._motor, self._steps.pop(0)
         motor.freeze(t)
-        if step.switch != HOME and step.speed == Axis.SEARCH_SPEED:
+        if step.switch != HOME and step.speed == AxisParameter.SEARCH_SPEED:
             self._ends.append(motor.position(t))
         if len(self._ends) > 1:
-            motor.parameters[Axis.SWITCH_DISTANCE] = abs(wrapped(self._ends[0] - self._ends[1]))
+            motor.parameters[AxisParameter.SWITCH_DISTANCE] = abs(wrapped(self._ends[0] - self._ends[1]))
         if not self._steps:
-            motor.parameters[Axis.SEARCH_POSITION] = motor.position(t)
+            motor.parameters[AxisParameter.SEARCH_POSITION] = motor.position(t)
             motor.stand_at(0, t)
 
     def _enter(self, t: float) -> None:

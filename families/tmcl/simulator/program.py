@@ -16,17 +16,17 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
-from multidrop.families.tmcl.manual.commands import Call, Command, Search, Status
+from multidrop.families.tmcl.manual.commands import Command, SearchAction, Status, TmclCall
 from multidrop.families.tmcl.manual.instructions import (
     CONTROL,
     EMPTY,
     MEMORY,
     STACK,
-    Condition,
+    Calculation,
     Flag,
-    Operation,
+    JumpCondition,
+    ProgramWord,
     Wait,
-    Word,
 )
 from multidrop.families.tmcl.simulator.motor import wrapped
 
@@ -42,32 +42,44 @@ ALL = 255
 BY_ACCUMULATOR = -1
 """A value that stands for the accumulator."""
 ALL_PORTS = 255
-EMPTY_LINE = Call(EMPTY)
-JUMPS = frozenset({Word.JA, Word.JC, Word.CSUB, Word.CALL, Word.RSUB, Word.RST, Word.DJNZ, Word.STOP, Word.RETI})
+EMPTY_LINE = TmclCall(EMPTY)
+JUMPS = frozenset(
+    {
+        ProgramWord.JA,
+        ProgramWord.JC,
+        ProgramWord.CSUB,
+        ProgramWord.CALL,
+        ProgramWord.RSUB,
+        ProgramWord.RST,
+        ProgramWord.DJNZ,
+        ProgramWord.STOP,
+        ProgramWord.RETI,
+    }
+)
 OPERANDS: Mapping[int, tuple[str, str]] = {
-    Word.CALC: ("A", "value"),
-    Word.CALCX: ("A", "X"),
-    Word.CALCVV: ("V", "V2"),
-    Word.CALCVA: ("V", "A"),
-    Word.CALCAV: ("A", "V"),
-    Word.CALCVX: ("V", "X"),
-    Word.CALCXV: ("X", "V"),
-    Word.CALCV: ("V", "value"),
+    ProgramWord.CALC: ("A", "value"),
+    ProgramWord.CALCX: ("A", "X"),
+    ProgramWord.CALCVV: ("V", "V2"),
+    ProgramWord.CALCVA: ("V", "A"),
+    ProgramWord.CALCAV: ("A", "V"),
+    ProgramWord.CALCVX: ("V", "X"),
+    ProgramWord.CALCXV: ("X", "V"),
+    ProgramWord.CALCV: ("V", "value"),
 }
 """Target and second operand: the accumulator, the X register, a user variable, a second one, the value of the line."""
-FROM_ACCUMULATOR: Mapping[int, Command | Word] = {
-    Word.AAP: Command.SAP,
-    Word.AGP: Command.SGP,
-    Word.ACO: Word.SCO,
-    Word.MVPA: Command.MVP,
-    Word.ROLA: Command.ROL,
-    Word.RORA: Command.ROR,
+FROM_ACCUMULATOR: Mapping[int, Command | ProgramWord] = {
+    ProgramWord.AAP: Command.SAP,
+    ProgramWord.AGP: Command.SGP,
+    ProgramWord.ACO: ProgramWord.SCO,
+    ProgramWord.MVPA: Command.MVP,
+    ProgramWord.ROLA: Command.ROL,
+    ProgramWord.RORA: Command.ROR,
 }
 """The lines that are a command of the direct mode with the accumulator as its value."""
-READS = frozenset({Command.GAP, Command.GGP, Word.GIO, Word.GCO})
+READS = frozenset({Command.GAP, Command.GGP, ProgramWord.GIO, ProgramWord.GCO})
 
 
-class Failure(NamedTuple):
+class FailedLine(NamedTuple):
     """A line that was not carried out: when, its address, and why."""
 
     t: float
@@ -83,7 +95,7 @@ class Context(NamedTuple):
     x: int
     zero: bool | None
     order: int | None
-    waits: Call | None
+    waits: TmclCall | None
     due: float
 
 
@@ -91,19 +103,19 @@ class NotKnown(Exception):
     """The module does not have this line."""
 
 
-Execute = Callable[[Call, float], tuple[int, int]]
+Execute = Callable[[TmclCall, float], tuple[int, int]]
 """Carries out a command of the direct mode; its status and its value."""
-Over = Callable[[Call, float], bool]
+Over = Callable[[TmclCall, float], bool]
 """Whether what a WAIT waits for has come."""
 Signals = Callable[[float], Mapping[int, bool]]
 """The states whose beginning is an interrupt, by its number."""
 
 
-class Program:
+class TmclProgram:
     """One program, and the memory that holds it."""
 
     def __init__(self, execute: Execute, over: Over, signals: Signals = lambda t: {}) -> None:
-        self._cells: dict[int, Call] = {}
+        self._cells: dict[int, TmclCall] = {}
         self.storing = False
         """In download mode: every command but the control commands becomes a line."""
         self.running = False
@@ -111,14 +123,14 @@ class Program:
         """The address of the next line."""
         self.executed = 0
         """Lines carried out since power-up."""
-        self.failures: list[Failure] = []
+        self.failures: list[FailedLine] = []
         self.before: Callable[[float, int], bool] | None = None
         """Called before each line; true: the program halts there."""
-        self.after: Callable[[float, Call], None] | None = None
+        self.after: Callable[[float, TmclCall], None] | None = None
         self._execute, self._over, self._signals = execute, over, signals
         self._pointer = 0
         self._due = inf
-        self._waits: Call | None = None
+        self._waits: TmclCall | None = None
         self.accumulator = self.x = 0
         self._zero: bool | None = None
         self._order: int | None = None
@@ -133,14 +145,14 @@ class Program:
     # The memory
 
     @property
-    def memory(self) -> Sequence[Call]:
+    def memory(self) -> Sequence[TmclCall]:
         """The lines, up to the last one that was stored."""
         return [self.line(at) for at in range(max(self._cells, default=-1) + 1)]
 
-    def line(self, at: int) -> Call:
+    def line(self, at: int) -> TmclCall:
         return self._cells.get(at, EMPTY_LINE)
 
-    def load(self, lines: Mapping[int, Call]) -> None:
+    def load(self, lines: Mapping[int, TmclCall]) -> None:
         """Hold these lines, and no others."""
         self._cells = {at: call for at, call in lines.items() if call.command != EMPTY}
 
@@ -149,7 +161,7 @@ class Program:
         self.halt()
         self.storing, self._pointer = True, max(0, place)
 
-    def store(self, call: Call) -> bool:
+    def store(self, call: TmclCall) -> bool:
         """Store a line; whether there was room."""
         if self._pointer >= MEMORY:
             return False
@@ -221,59 +233,61 @@ class Program:
         try:
             self._carry_out(call, t)
         except NotKnown:
-            self.failures.append(Failure(t, at, "the simulated module does not have it; the program ends"))
+            self.failures.append(FailedLine(t, at, "the simulated module does not have it; the program ends"))
             self.halt()
         except ZeroDivisionError:
-            self.failures.append(Failure(t, at, "division by 0; the line is passed over"))
+            self.failures.append(FailedLine(t, at, "division by 0; the line is passed over"))
         if self.after is not None:
             self.after(t, call)
 
-    def _carry_out(self, call: Call, t: float) -> None:
+    def _carry_out(self, call: TmclCall, t: float) -> None:
         number = call.command
         if number in JUMPS:
             return self._jump(call, t)
         if number in OPERANDS:
             return self._calculate(call, t)
         match number:
-            case Word.SIV | Word.GIV | Word.AIV if self.x not in VARIABLES:
+            case ProgramWord.SIV | ProgramWord.GIV | ProgramWord.AIV if self.x not in VARIABLES:
                 pass  # the user variable whose number is in X: any other number is ignored
-            case Word.GIV:
+            case ProgramWord.GIV:
                 self._take(self._variable(self.x, t))
-            case Word.SIV | Word.AIV:
-                self._set_variable(self.x, call.value if number == Word.SIV else self.accumulator, t)
-            case Word.WAIT:
+            case ProgramWord.SIV | ProgramWord.AIV:
+                self._set_variable(self.x, call.value if number == ProgramWord.SIV else self.accumulator, t)
+            case ProgramWord.WAIT:
                 ticks = self.accumulator if call.value == BY_ACCUMULATOR else call.value
                 if call.type == Wait.TICKS:
                     self._waits, self._due = call, t + max(LINE_TIME, ticks * TICK)
                 elif not self._over(call, t):
                     self._waits, self._due = call, t + ticks * TICK if ticks > 0 else inf
-            case Word.COMP:
+            case ProgramWord.COMP:
                 self._compare(self.accumulator, call.value)
-            case Word.CLE:
+            case ProgramWord.CLE:
                 self._errors -= {Flag(call.type)} if call.type in tuple(Flag)[1:] else set(Flag)
-            case Word.VECT:
+            case ProgramWord.VECT:
                 self._vectors[call.type] = max(0, call.value)
-            case Word.DI:
+            case ProgramWord.DI:
                 self._enabled.discard(call.type)
                 self._timers.pop(call.type, None)
-            case Word.EI:
+            case ProgramWord.EI:
                 self._enabled.add(call.type)
                 self._start_timer(call.type, t)
-            case Word.SIO if (call.type, call.value) == (ALL_PORTS, BY_ACCUMULATOR):
-                self._do(Call(number, call.type, call.motor, self.accumulator), t)
+            case ProgramWord.SIO if (call.type, call.value) == (ALL_PORTS, BY_ACCUMULATOR):
+                self._do(TmclCall(number, call.type, call.motor, self.accumulator), t)
             case _ if number in FROM_ACCUMULATOR:
-                self._do(Call(FROM_ACCUMULATOR[number], call.type, call.motor, self.accumulator), t)
+                self._do(TmclCall(FROM_ACCUMULATOR[number], call.type, call.motor, self.accumulator), t)
             case _:
                 self._do(call, t)
 
-    def _do(self, call: Call, t: float) -> int:
+    def _do(self, call: TmclCall, t: float) -> int:
         """Carry out a command of the direct mode; what it reads goes into the accumulator."""
         status, value = self._execute(call, t)
         if status == Status.INVALID_COMMAND or call.command >= CONTROL:
             raise NotKnown
         if status != Status.DONE:
-            self.failures.append(Failure(t, self.counter - 1, f"refused with status {status}; the line is passed over"))
-        elif call.command in READS or (call.command, call.type) == (Command.RFS, Search.STATUS):
+            self.failures.append(
+                FailedLine(t, self.counter - 1, f"refused with status {status}; the line is passed over")
+            )
+        elif call.command in READS or (call.command, call.type) == (Command.RFS, SearchAction.STATUS):
             self._take(value)
         return value
 
@@ -285,72 +299,74 @@ class Program:
 
     # Jumps
 
-    def _jump(self, call: Call, t: float) -> None:
+    def _jump(self, call: TmclCall, t: float) -> None:
         match call.command:
-            case Word.STOP:
+            case ProgramWord.STOP:
                 self.halt()
-            case Word.RSUB:
+            case ProgramWord.RSUB:
                 self.counter = self._stack.pop() if self._stack else self.counter
-            case Word.RST:
+            case ProgramWord.RST:
                 self._reset(max(0, call.value))
-            case Word.RETI if self._context is not None:
+            case ProgramWord.RETI if self._context is not None:
                 kept, self._context = self._context, None
                 self.counter, self.accumulator, self.x = kept.counter, kept.accumulator, kept.x
                 self._zero, self._order = kept.zero, kept.order
                 self._waits, self._due = kept.waits, max(kept.due, self._due)
-            case Word.RETI:
+            case ProgramWord.RETI:
                 pass
-            case Word.DJNZ:
+            case ProgramWord.DJNZ:
                 left = wrapped(self._variable(call.type, t) - 1)
                 self._set_variable(call.type, left, t)
                 self.counter = max(0, call.value) if left else self.counter
-            case Word.CSUB | Word.CALL:
-                if len(self._stack) < STACK and (call.command == Word.CSUB or self._met(call.type)):
+            case ProgramWord.CSUB | ProgramWord.CALL:
+                if len(self._stack) < STACK and (call.command == ProgramWord.CSUB or self._met(call.type)):
                     self._stack.append(self.counter)
                     self.counter = max(0, call.value)
             case _:
-                self.counter = max(0, call.value) if call.command == Word.JA or self._met(call.type) else self.counter
+                self.counter = (
+                    max(0, call.value) if call.command == ProgramWord.JA or self._met(call.type) else self.counter
+                )
 
     def _met(self, condition: int) -> bool:
         order = self._order
-        if condition in (Condition.ZE, Condition.NZ):
-            return self._zero is (condition == Condition.ZE)
-        if condition in range(Condition.ETO, Condition.ESD + 1):
-            return Flag[Condition(condition).name] in self._errors
+        if condition in (JumpCondition.ZE, JumpCondition.NZ):
+            return self._zero is (condition == JumpCondition.ZE)
+        if condition in range(JumpCondition.ETO, JumpCondition.ESD + 1):
+            return Flag[JumpCondition(condition).name] in self._errors
         if order is None:
-            return condition == Condition.NE
+            return condition == JumpCondition.NE
         by_order: Mapping[int, bool] = {
-            Condition.EQ: order == 0,
-            Condition.NE: order != 0,
-            Condition.GT: order > 0,
-            Condition.GE: order >= 0,
-            Condition.LT: order < 0,
-            Condition.LE: order <= 0,
+            JumpCondition.EQ: order == 0,
+            JumpCondition.NE: order != 0,
+            JumpCondition.GT: order > 0,
+            JumpCondition.GE: order >= 0,
+            JumpCondition.LT: order < 0,
+            JumpCondition.LE: order <= 0,
         }
         return by_order.get(condition, False)
 
     # Registers and user variables
 
     def _variable(self, number: int, t: float) -> int:
-        return self._execute(Call(Command.GGP, number, USERS), t)[1] if number in VARIABLES else 0
+        return self._execute(TmclCall(Command.GGP, number, USERS), t)[1] if number in VARIABLES else 0
 
     def _set_variable(self, number: int, value: int, t: float) -> None:
-        self._do(Call(Command.SGP, number, USERS, value), t)
+        self._do(TmclCall(Command.SGP, number, USERS, value), t)
 
-    def _calculate(self, call: Call, t: float) -> None:
+    def _calculate(self, call: TmclCall, t: float) -> None:
         target, other = OPERANDS[call.command]
-        if call.command == Word.CALCX and call.type in (Operation.NOT, Operation.LOAD):
-            target, other = "X", "X" if call.type == Operation.NOT else "A"
+        if call.command == ProgramWord.CALCX and call.type in (Calculation.NOT, Calculation.LOAD):
+            target, other = "X", "X" if call.type == Calculation.NOT else "A"
         left, right = self._operand(target, call, t), self._operand(other, call, t)
-        if call.type == Operation.COMP:
+        if call.type == Calculation.COMP:
             return self._compare(left, right)
-        if call.type == Operation.SWAP:
+        if call.type == Calculation.SWAP:
             self._put(other, left, call, t)
-        if call.type == Operation.NOT and other == "value":
+        if call.type == Calculation.NOT and other == "value":
             right = left
         self._put(target, calculated(call.type, left, right), call, t)
 
-    def _operand(self, place: str, call: Call, t: float) -> int:
+    def _operand(self, place: str, call: TmclCall, t: float) -> int:
         if place == "A":
             return self.accumulator
         if place == "X":
@@ -359,7 +375,7 @@ class Program:
             return call.value
         return self._variable(call.motor if place == "V" else call.value, t)
 
-    def _put(self, place: str, value: int, call: Call, t: float) -> None:
+    def _put(self, place: str, value: int, call: TmclCall, t: float) -> None:
         self._zero = value == 0
         if place == "A":
             self.accumulator = value
@@ -371,7 +387,7 @@ class Program:
     # Interrupts
 
     def _start_timer(self, number: int, t: float) -> None:
-        period = self._execute(Call(Command.GGP, number, INTERRUPTS), t)[1] if number in TIMERS else 0
+        period = self._execute(TmclCall(Command.GGP, number, INTERRUPTS), t)[1] if number in TIMERS else 0
         if period > 0:
             self._timers[number] = t + max(LINE_TIME, period / 1000)
 
@@ -395,21 +411,21 @@ class Program:
 def calculated(operation: int, left: int, right: int) -> int:
     """The result of an operation, as a signed number of 32 bits. Raises ZeroDivisionError."""
     match operation:
-        case Operation.ADD:
+        case Calculation.ADD:
             return wrapped(left + right)
-        case Operation.SUB:
+        case Calculation.SUB:
             return wrapped(left - right)
-        case Operation.MUL:
+        case Calculation.MUL:
             return wrapped(left * right)
-        case Operation.DIV | Operation.MOD:
+        case Calculation.DIV | Calculation.MOD:
             whole = abs(left) // abs(right) * (1 if (left < 0) == (right < 0) else -1)
-            return wrapped(whole if operation == Operation.DIV else left - whole * right)
-        case Operation.AND:
+            return wrapped(whole if operation == Calculation.DIV else left - whole * right)
+        case Calculation.AND:
             return left & right
-        case Operation.OR:
+        case Calculation.OR:
             return left | right
-        case Operation.XOR:
+        case Calculation.XOR:
             return left ^ right
-        case Operation.NOT:
+        case Calculation.NOT:
             return ~right
     return right

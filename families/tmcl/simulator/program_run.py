@@ -8,18 +8,18 @@ from dataclasses import replace
 from multidrop.base.errors import Diagnostic
 from multidrop.base.text import whole
 from multidrop.families.tmcl.manual import program_file
-from multidrop.families.tmcl.manual.commands import Axis, Call, Command, Search
-from multidrop.families.tmcl.manual.instructions import Word
+from multidrop.families.tmcl.manual.commands import AxisParameter, Command, SearchAction, TmclCall
+from multidrop.families.tmcl.manual.instructions import ProgramWord
 from multidrop.families.tmcl.manual.parameters import TARGETS
 from multidrop.families.tmcl.manual.program_file import Assembled
 from multidrop.families.tmcl.simulator.module import TmclModule, worlds_of
 from multidrop.families.tmcl.simulator.program import ALL_PORTS, USERS
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.program_events import BreakPoint, Debugging, Event, Recorder, Summary, Values
+from multidrop.simulator.program_events import BreakPoint, DebugWishes, ProgramEvent, RunRecorder, Summary, Values
 from multidrop.simulator.program_run import ProgramRun, Reader
 
-_MOTIONS = frozenset({Command.ROR, Command.ROL, Command.MVP, Word.MVPA, Word.ROLA, Word.RORA})
-_SETS = frozenset({Command.SAP, Word.AAP})
+_MOTIONS = frozenset({Command.ROR, Command.ROL, Command.MVP, ProgramWord.MVPA, ProgramWord.ROLA, ProgramWord.RORA})
+_SETS = frozenset({Command.SAP, ProgramWord.AAP})
 
 
 class TmclRun(ProgramRun):
@@ -39,8 +39,8 @@ class TmclRun(ProgramRun):
         address = spec.name if spec.name.isdigit() else self.drive.name
         self._device = TmclModule(replace(spec, name=address, program="", program_name=""), worlds_of(spec))
         self._program = self.running = self._device.program
-        self._program.load({each.at: each.call for each in made.lines})
-        self._lines = {each.at: each.source for each in made.lines}
+        self._program.load({line.at: line.call for line in made.lines})
+        self._lines = {line.at: line.source for line in made.lines}
         self._begun: tuple[float, int] = (0.0, 0)
         self._moves = 0
         self._ended_at = 0.0
@@ -49,7 +49,7 @@ class TmclRun(ProgramRun):
     def parsed(cls, text: str, file: str) -> Assembled:
         return program_file.assembled(program_file.read(text, file))
 
-    def begin(self, start: str, debugging: Debugging) -> None:
+    def begin(self, start: str, debugging: DebugWishes) -> None:
         """Begin at a label or an address."""
         if not self._made.lines:
             raise Diagnostic("no line to run", self.file, "a program has one command at least")
@@ -57,7 +57,7 @@ class TmclRun(ProgramRun):
         if address is None:
             raise Diagnostic(f"no label {start}", self.file, f"valid: {', '.join(self._made.labels) or '0'}")
         if debugging.wanted:
-            self.recorder = self.recording(debugging, Recorder)
+            self.recorder = self.recording(debugging, RunRecorder)
         self._program.before, self._program.after = self._before, self._after
         self._program.run(0.0, address)
 
@@ -84,9 +84,9 @@ class TmclRun(ProgramRun):
         if name in ("A", "X"):
             return lambda: self.unnamed(False)[name]
         if number is not None:
-            call = Call(Command.GGP, number, USERS)
+            call = TmclCall(Command.GGP, number, USERS)
         elif axis is not None:
-            call = Call(Command.GAP, axis)
+            call = TmclCall(Command.GAP, axis)
         else:
             return None
         return lambda: self._device.carry_out(call, self._begun[0])[1]
@@ -104,31 +104,31 @@ class TmclRun(ProgramRun):
         self._begun = t, self._lines.get(at, 0)
         return self.recorder is not None and self.recorder.reaches(*self._begun)
 
-    def _after(self, t: float, call: Call) -> None:
+    def _after(self, t: float, call: TmclCall) -> None:
         self._ended_at = t
         self._moves += _begins_motion(call)
         failed = bool(self._program.failures) and self._program.failures[-1].t == t
-        if call.command == Word.SIO and call.motor == USERS and not failed:
+        if call.command == ProgramWord.SIO and call.motor == USERS and not failed:
             where = "all outputs" if call.type == ALL_PORTS else f"output {call.type}"
-            self.events.append(Event(t, {"port": call.type, "value": call.value}, f"{where} = {call.value}"))
+            self.events.append(ProgramEvent(t, {"port": call.type, "value": call.value}, f"{where} = {call.value}"))
         if self.recorder is not None:
             self.recorder.after(t, self._begun[1])
 
-    def happened(self) -> Iterator[Event]:
+    def happened(self) -> Iterator[ProgramEvent]:
         """What was not carried out."""
-        for each in self._program.failures:
-            line = self._lines.get(each.at, 0)
+        for failure in self._program.failures:
+            line = self._lines.get(failure.at, 0)
             text = self.shown(self.source[line - 1]) if line else ""
-            facts = {"error": each.why, "line": line, "text": text}
-            yield Event(each.t, facts, f"{text} at {each.t:.4f} s: {each.why}", line, problem=True)
-            self.errors.append(each.why)
+            facts = {"error": failure.why, "line": line, "text": text}
+            yield ProgramEvent(failure.t, facts, f"{text} at {failure.t:.4f} s: {failure.why}", line, problem=True)
+            self.errors.append(failure.why)
         self._program.failures.clear()
 
     def summary(self, ended: str, until: float | None) -> Summary:
         running = self._program.running
         position, velocity = (
-            self._device.carry_out(Call(Command.GAP, each), self.now)[1]
-            for each in (Axis.ACTUAL_POSITION, Axis.ACTUAL_VELOCITY)
+            self._device.carry_out(TmclCall(Command.GAP, each), self.now)[1]
+            for each in (AxisParameter.ACTUAL_POSITION, AxisParameter.ACTUAL_VELOCITY)
         )
         return self.summed(
             ended,
@@ -138,12 +138,12 @@ class TmclRun(ProgramRun):
             place=f"position {position}",
             moves=self._moves,
             moving=velocity != 0,
-            lines_at=tuple(each for each in (self._lines.get(self._program.counter, 0),) if running),
+            lines_at=tuple(line for line in (self._lines.get(self._program.counter, 0),) if running),
             turning="the motor still turns; WAIT POS before STOP waits for it",
         )
 
 
-def _begins_motion(call: Call) -> bool:
+def _begins_motion(call: TmclCall) -> bool:
     if call.command in _SETS:
         return call.type in TARGETS
-    return call.command in _MOTIONS or (call.command, call.type) == (Command.RFS, Search.START)
+    return call.command in _MOTIONS or (call.command, call.type) == (Command.RFS, SearchAction.START)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from multidrop.families.lexium.simulator.ports.replies import checksum
 from multidrop.families.tmcl.host import codec
 from multidrop.families.tmcl.manual import commands
-from multidrop.features.sharing.writer_turns import SILENT
+from multidrop.features.sharing.writer_turns import WRITER_TIMEOUT
 from soak.simulation.records.places import Place
 from soak.simulation.world import World
 
 if TYPE_CHECKING:
     from multidrop.features.sharing.server import SharedPort
 
-QUIET = SILENT + 1.0
+QUIET = WRITER_TIMEOUT + 1.0
 """The time in which nobody writes, so that the guest may, s."""
 
 

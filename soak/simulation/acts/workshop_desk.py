@@ -276,13 +276,13 @@ async def late(world: World, rng: Random) -> None:
 
 def _sets(shop: Workshop, drive: str, value: int) -> None:
     """Give a drive the value that it is asked for."""
-    from multidrop.families.tmcl.manual.commands import Call
+    from multidrop.families.tmcl.manual.commands import TmclCall
 
     witness = shop.witnesses[drive]
     if shop.language == "mcode":
         witness.device.memory.values["R1"] = value
     else:
-        witness.unwatched(f"V1={value}" if shop.language == "pmx" else Call(5, 195, 0, value), shop.floor.now())
+        witness.unwatched(f"V1={value}" if shop.language == "pmx" else TmclCall(5, 195, 0, value), shop.floor.now())
 
 
 NAK = b"\x15"

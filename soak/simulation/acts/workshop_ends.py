@@ -194,7 +194,7 @@ async def watched(world: World, rng: Random) -> None:
             session=session, stop_ahead=session.stop_ahead, presenter=SimpleNamespace(notes=[], on_records={})
         )
         with mock.patch.object(feed, "Gate", _Gate):
-            fed = feed.Feed(app, shop.folder)
+            fed = feed.ScreenFeed(app, shop.folder)
         calls = _Gate.made.calls
         running = shop.start(_automation(shop)(["@a SL 40000", "/sleep 30"])) if rng.random() < 0.7 else None
         await asyncio.sleep(0.5 + rng.random() * 2)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf
 
 from multidrop.transports import telnet
-from multidrop.transports.relay import Frames, Garbled, Kind
+from multidrop.transports.relay import FrameSplitter, GarbledFrame, Kind
 from soak.languages import LANGUAGES
 from soak.simulation.judges.rule import Lived, Rule
 from soak.simulation.records.commands import Command
@@ -46,7 +46,7 @@ def for_drives(kind: str, left: bytes) -> bytes:
     if kind == "rfc2217":
         return b"".join(each.data for each in telnet.Decoder().receive(left) if isinstance(each, telnet.Data))
     if kind == "ssh":
-        return b"".join(payload for each, payload in Frames().take(left) if each is Kind.DATA)
+        return b"".join(payload for each, payload in FrameSplitter().take(left) if each is Kind.DATA)
     return left
 
 
@@ -145,7 +145,7 @@ def _written(life: Lived, line: str, index: int) -> bytes:
     )
     try:
         return for_drives(kind, whole)[len(for_drives(kind, before)) :]
-    except Garbled:  # bytes are no frames where a session before has left half of one
+    except GarbledFrame:  # bytes are no frames where a session before has left half of one
         return history.written[index][2]
 
 
@@ -230,7 +230,7 @@ def stop_bytes(life: Lived, line: str, stop: Stop, until: float) -> bytes:
     )
     try:
         return for_drives(place.kind, whole)[len(for_drives(place.kind, before)) :]
-    except Garbled:
+    except GarbledFrame:
         return whole[len(before) :]
 
 

@@ -13,7 +13,7 @@ from contextlib import suppress
 from math import inf
 
 from multidrop.families.lexium.manual.errors import BY_ITSELF as MACHINES
-from multidrop.transports.relay import Garbled
+from multidrop.transports.relay import GarbledFrame
 from soak.languages import TICKS
 from soak.simulation.judges.departures import for_drives
 from soak.simulation.judges.rule import Grant, Granted, Lived, Rule
@@ -339,7 +339,7 @@ def _heard(life: Lived, shown: Shown) -> bytes:
     """What the drives of a line sent since a question; of a relay without its frames."""
     received = life.history.received.get(shown.line, [])
     heard = b"".join(data for at, data in received if shown.began <= at <= shown.at)
-    with suppress(Garbled):  # it begins within a frame
+    with suppress(GarbledFrame):  # it begins within a frame
         return for_drives("ssh", heard) if life.place(shown.line).kind == "ssh" else heard
     return heard
 

@@ -6,7 +6,7 @@ import os.path
 import re
 from collections.abc import Collection, Iterator
 
-from multidrop.transports.relay import Garbled, Kind, frame
+from multidrop.transports.relay import GarbledFrame, Kind, frame
 from soak.languages import LANGUAGES
 from soak.simulation.judges.departures import for_drives, stop_bytes, under_way
 from soak.simulation.judges.rule import Grant, Granted, Lived, Rule
@@ -92,7 +92,7 @@ def _begins_with_a_stop(life: Lived, line: str, left: bytes) -> bool:
     place = life.place(line[:2])
     try:
         return bool(re.match(LANGUAGES[place.language].stop, for_drives(place.kind, left)))
-    except Garbled:  # the rest of a message that had begun to leave
+    except GarbledFrame:  # the rest of a message that had begun to leave
         return False
 
 

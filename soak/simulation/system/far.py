@@ -166,7 +166,7 @@ class FarSide:
         seam.select = SimpleNamespace(select=lambda *given: self._ready(waits, *given))
         try:
             alive = self._loop._turn()
-        except (TransportLost, relay.Garbled) as problem:
+        except (TransportLost, relay.GarbledFrame) as problem:
             alive, words = False, f"multidrop: {problem}"
         finally:
             seam.select = before

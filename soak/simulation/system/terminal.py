@@ -12,8 +12,8 @@ import sys
 from types import SimpleNamespace
 from typing import Any
 
-from multidrop.shell.streams.event_printer import Printer
-from multidrop.shell.streams.output_streams import Outlet, Streams, _notice
+from multidrop.shell.streams.event_printer import EventPrinter
+from multidrop.shell.streams.output_streams import OutputStream, Streams, _notice
 from multidrop.shell.threads import BoundedWriter
 from soak.simulation.system.clock import SimulatedLoop
 
@@ -40,9 +40,9 @@ class Terminal(BoundedWriter):
         null = os.open(os.devnull, os.O_WRONLY)
         stream: Any = SimpleNamespace(isatty=lambda: True, fileno=lambda: null, encoding="utf-8")
         super().__init__(self._take, _notice(stream, self), lambda problem: None, LIMIT, LIMIT)
-        self._outlets = Outlet(stream, self, False), Outlet(stream, self, True)
+        self._outlets = OutputStream(stream, self, False), OutputStream(stream, self, True)
         os.close(null)
-        self._printer = Printer(talkative=True)
+        self._printer = EventPrinter(talkative=True)
 
     def show(self, event: Any) -> None:
         """Print an event of the session."""

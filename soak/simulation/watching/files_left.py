@@ -9,7 +9,7 @@ from pathlib import Path
 from multidrop.base.errors import Diagnostic
 from multidrop.features.log_analysis.judge import judged
 from multidrop.macros import MacroStore
-from multidrop.shell.log.files import ENDING, entry_of, whole
+from multidrop.shell.log.files import LOG_SUFFIX, entry_of, whole
 from soak.simulation.records.history import History
 
 
@@ -40,14 +40,14 @@ def _state(state: Path, history: History) -> Iterator[str]:
             and not path.read_text().startswith(("'", "*", "#", "//", ";"))
         ):
             yield f"{name} is damaged"
-        if ENDING in path.name:
+        if LOG_SUFFIX in path.name:
             lines = path.read_bytes().split(b"\n")[:-1]
             yield from (f"{name}: {line!r}" for line in lines if entry_of(line + b"\n") is None)
 
 
 def breaches_in_logs(folder: Path, history: History) -> Iterator[str]:
     """What `log judge` finds in the logs of all lives."""
-    for path in (*sorted((folder / "state" / "logs").glob(f"*{ENDING}")), folder / "session.log"):
+    for path in (*sorted((folder / "state" / "logs").glob(f"*{LOG_SUFFIX}")), folder / "session.log"):
         if path.exists():
             history.count("logs judged")
             yield from (

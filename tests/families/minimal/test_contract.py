@@ -3,14 +3,14 @@
 import pytest
 
 from multidrop.base import registry
-from multidrop.base.registry import Entry
+from multidrop.base.registry import FeatureEntry
 from multidrop.contract import Absent, FamilyContract, FamilySample, Moved, Read, Wrong
 from tests.support import knock
 
 
 def listed(patch: pytest.MonkeyPatch) -> None:
     """List the family, as the entry point of an installed package does."""
-    patch.setattr(registry, "_others", {"p": (Entry("knock", "dist", "1", "p"), knock.FAMILY)})
+    patch.setattr(registry, "_others", {"p": (FeatureEntry("knock", "dist", "1", "p"), knock.FAMILY)})
 
 
 class TestKnock(FamilyContract):

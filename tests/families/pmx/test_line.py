@@ -9,10 +9,10 @@ from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects import End, Hints, Priority, StopPiece
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.line import QUIET, Finished, Line, Write
+from multidrop.drives.line import RECOVERY_QUIET, Finished, Line, Write
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.drives.stopping import Fate
-from multidrop.families.pmx.host.codec import GAP, Pmx
+from multidrop.families.pmx.host.codec import STOP_PIECE_QUIET, Pmx
 from multidrop.transports import Transport
 from tests.support.virtual import in_virtual_time
 
@@ -254,7 +254,11 @@ def test_the_gap_is_only_between_pieces_of_a_stop():
     while len(seen) < 3:
         now = line.deadline
         seen += [(round(now, 3), event.data) for event in line.events(now) if isinstance(event, Write)]
-    assert seen == [(GAP, b"one\r"), (2 * GAP, b"two\r"), (round(2 * GAP + QUIET, 3), b"@00PX\r")]
+    assert seen == [
+        (STOP_PIECE_QUIET, b"one\r"),
+        (2 * STOP_PIECE_QUIET, b"two\r"),
+        (round(2 * STOP_PIECE_QUIET + RECOVERY_QUIET, 3), b"@00PX\r"),
+    ]
 
 
 def test_what_nobody_asked_for_is_shown_but_not_the_answers_to_a_stop():

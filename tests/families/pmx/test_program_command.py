@@ -14,7 +14,7 @@ from multidrop.families.pmx.manual import program_file
 from multidrop.families.pmx.simulator.program_run import AScriptRun
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cells import read
-from multidrop.simulator.program_events import Event, Summary
+from multidrop.simulator.program_events import ProgramEvent, Summary
 from tests.support import pmx_programs as shapes
 from tests.support.cell_session import bus, drive, pmx
 from tests.support.front_door import Command, Done
@@ -30,7 +30,7 @@ def program(multidrop: Command) -> Command:
     return partial(multidrop, "program", "test")
 
 
-def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Event], Summary]:
+def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[ProgramEvent], Summary]:
     (_, bus) = read(CELL.format(inputs=inputs) + more, "cell").buses
     trial = AScriptRun(bus.drives[0], program_file.read(text, "a.prg"), "a.prg")
     *events, end = trial.run("", until)

@@ -8,7 +8,7 @@ import csv
 
 import pytest
 
-from multidrop.families.pmx.manual.table import COMMANDS, Kept, record
+from multidrop.families.pmx.manual.table import COMMANDS, PmxRetention, record
 from tests.support.cases import for_each
 from tests.support.paths import ROOT
 
@@ -52,6 +52,8 @@ def test_a_cell_with_an_unknown_answer_is_refused(column: str) -> None:
 
 def test_the_facts_of_a_command_agree_with_each_other() -> None:
     for row in COMMANDS.values():
-        assert (row.kept is not Kept.NONE) == (row.access == "RW"), row.name
-        assert (row.low is None) == (row.high is None) and (row.low is None or row.kept is not Kept.NONE), row.name
+        assert (row.kept is not PmxRetention.NONE) == (row.access == "RW"), row.name
+        assert (row.low is None) == (row.high is None) and (row.low is None or row.kept is not PmxRetention.NONE), (
+            row.name
+        )
         assert not row.quiet or row.starts, row.name

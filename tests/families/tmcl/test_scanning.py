@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, Stopped
 from multidrop.families.tmcl.host.codec import frame_of
-from multidrop.families.tmcl.manual.commands import Call
+from multidrop.families.tmcl.manual.commands import TmclCall
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import NothingFound, Scanning, url_of
@@ -19,7 +19,7 @@ HAZARD = (
     "a frame may hold bytes that MCode drives on the line obey: the addresses 3, 10, 13 and 27, and other bytes of a "
     "frame, are ^C, LF, CR and ESC to them"
 )
-IDENTITY, MST = Call(136, 1), Call(3)
+IDENTITY, MST = TmclCall(136, 1), TmclCall(3)
 LINE = ("1", "3", "27", "200")
 
 
@@ -128,7 +128,7 @@ async def test_what_cannot_be_read_is_said_once_for_all_addresses(tmp_path):
 async def test_half_a_message_of_another_host_hides_no_module(tmp_path):
     port = Port(tmp_path, line(*LINE))
     for device in port.floor.floor.wires["b"]._ports:
-        device.receive(frame_of(1, Call(1, 0, 0, 500))[:5], 0.0)
+        device.receive(frame_of(1, TmclCall(1, 0, 0, 500))[:5], 0.0)
     found, search = scanning(port)
     await search.run([9600], True)
     assert [each["address"] for each in found] == list(LINE)

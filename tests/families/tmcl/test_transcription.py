@@ -9,7 +9,7 @@ import csv
 import pytest
 
 from multidrop.families.tmcl.manual import parameters
-from multidrop.families.tmcl.manual.parameters import GROUPS, INT32, Parameter, Starts, record
+from multidrop.families.tmcl.manual.parameters import GROUPS, INT32, Starts, TmclParameter, record
 from tests.support.cases import for_each
 from tests.support.paths import ROOT
 
@@ -20,7 +20,7 @@ with (ROOT / "families" / "tmcl" / "manual" / "parameters.csv").open(encoding="u
 OF_CHIPS = {"of 2047"}
 
 
-def said(row: Parameter, fact: dict[str, str]) -> dict[str, str]:
+def said(row: TmclParameter, fact: dict[str, str]) -> dict[str, str]:
     found = {
         "group": fact["group"],
         "number": fact["number"],

@@ -15,12 +15,12 @@ from multidrop.base.errors import Diagnostic, NoAnswer, Refused, Stopped, Transp
 from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.owed_settings import owed
-from multidrop.families.lexium.simulator.device import Answer
+from multidrop.families.lexium.simulator.device import PrintedAnswer
 from multidrop.families.lexium.simulator.ports import replies
 from multidrop.families.lexium.simulator.ports.modbus import ModbusPort
 from multidrop.families.tmcl.manual import commands
 from multidrop.families.tmcl.manual.commands import Status
-from multidrop.families.tmcl.simulator.module import Answer as TmclAnswer
+from multidrop.families.tmcl.simulator.module import ModuleReply
 from multidrop.features.certify.certificate import SLEEP, WAIT, Asking, certify, compare, load
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Guarding, Settings
@@ -105,7 +105,7 @@ class Planted:
         found = self.real(call, now)
         if not self.begun or (call.command, call.type, call.motor, call.value) != known:
             return found
-        return TmclAnswer(Status.NOT_AVAILABLE if found.status == Status.DONE else Status.DONE, call.value)
+        return ModuleReply(Status.NOT_AVAILABLE if found.status == Status.DONE else Status.DONE, call.value)
 
     def mcode(self, text, now, **more):
         line, signed, sign = text.rpartition(',"')
@@ -117,9 +117,9 @@ class Planted:
             return answer
         prints = line.startswith("PR") and not self.fits
         if self.refused.get(line) or prints:
-            return Answer((f"-77{sign[:-1]}",) if line.startswith("PR") else ())
+            return PrintedAnswer((f"-77{sign[:-1]}",) if line.startswith("PR") else ())
         self.device.fail(33, now)
-        return Answer(refused=True)
+        return PrintedAnswer(refused=True)
 
 
 @contextlib.contextmanager

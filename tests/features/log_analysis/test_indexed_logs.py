@@ -16,7 +16,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.features.log_analysis import log_parts, moments
 from multidrop.features.log_analysis.moments import Moments
 from multidrop.shell.log import index
-from multidrop.shell.log.files import Entry, line_of, parts
+from multidrop.shell.log.files import LogEntry, line_of, parts
 from multidrop.shell.log.index import IndexKeeper, index_of
 from tests.support.examples import examples
 
@@ -36,26 +36,26 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @st.composite
-def logs(draw: st.DrawFn) -> list[Entry]:
+def logs(draw: st.DrawFn) -> list[LogEntry]:
     """The entries of a log of up to three sessions, whose clock may be set back, or show another zone."""
-    now, found = AT, [Entry(AT, "log", "session of process 1", marks=True)]
+    now, found = AT, [LogEntry(AT, "log", "session of process 1", marks=True)]
     for _ in range(draw(st.integers(0, 60))):
         now += timedelta(seconds=draw(st.sampled_from([0.0, 0.25, 3.0, 3.0, 3.0, -0.5, -8.0])))
         kind = draw(st.sampled_from([*KINDS, "sent", "received", "sent", "received", "log"]))
         drive = draw(st.sampled_from(["", "a", 'b"']))
         bus = draw(st.sampled_from(["press", 'p"x'])) if drive or draw(st.booleans()) else ""
         if kind == "log":
-            found.append(Entry(now, kind, draw(st.sampled_from(["session of process 2", "part of process 1"]))))
+            found.append(LogEntry(now, kind, draw(st.sampled_from(["session of process 2", "part of process 1"]))))
         elif kind in ("sent", "received"):
-            found.append(Entry(now, kind, "aPR P\n", bus, drive, poll=draw(st.booleans())))
+            found.append(LogEntry(now, kind, "aPR P\n", bus, drive, poll=draw(st.booleans())))
         elif kind == "stop":
-            found.append(Entry(now, kind, "stop of every drive"))
+            found.append(LogEntry(now, kind, "stop of every drive"))
         else:
-            found.append(Entry(now, kind, draw(TEXTS), bus, drive))
+            found.append(LogEntry(now, kind, draw(TEXTS), bus, drive))
     return found
 
 
-def written(path: Path, entries: Sequence[Entry], count: int, keeper: IndexKeeper | None) -> Path:
+def written(path: Path, entries: Sequence[LogEntry], count: int, keeper: IndexKeeper | None) -> Path:
     """Write a log in parts, with an index if there is a keeper of one."""
     for old in path.parent.glob(f"{path.name}*"):
         old.unlink()
@@ -92,7 +92,7 @@ def facts(path: Path, text: str) -> object:
 @examples(40, nightly=1000)
 @given(logs(), st.integers(1, 3), st.data())
 def test_a_moment_is_that_of_the_log_without_an_index(
-    folder: Path, entries: list[Entry], count: int, data: st.DataObject
+    folder: Path, entries: list[LogEntry], count: int, data: st.DataObject
 ) -> None:
     at = data.draw(st.sampled_from([each.time for each in entries])) + timedelta(seconds=0.1)
     plain = facts(written(folder / "plain.jsonl", entries, count, None), at.isoformat())
@@ -116,7 +116,7 @@ def inserted(data: bytes, place: int) -> bytes:
 @examples(40, nightly=1000)
 @given(logs(), st.sampled_from([cut, zeros, inserted]), st.data())
 def test_a_log_with_a_damaged_index_still_answers(
-    folder: Path, entries: list[Entry], damage: Callable[[bytes, int], bytes], data: st.DataObject
+    folder: Path, entries: list[LogEntry], damage: Callable[[bytes, int], bytes], data: st.DataObject
 ) -> None:
     path = written(folder / "day.jsonl", entries, 1, IndexKeeper(0))
     made = path.read_bytes().splitlines(keepends=True)
@@ -134,8 +134,8 @@ def test_a_log_with_a_damaged_index_still_answers(
 
 
 def test_a_part_that_was_removed_takes_its_entries_along(folder: Path) -> None:
-    entries = [Entry(AT, "log", "session of process 1"), Entry(AT, "output", "early", "press", "a")]
-    entries += [Entry(AT + timedelta(seconds=n), "typed", f"PR P {n}", "press", "a") for n in range(60)]
+    entries = [LogEntry(AT, "log", "session of process 1"), LogEntry(AT, "output", "early", "press", "a")]
+    entries += [LogEntry(AT + timedelta(seconds=n), "typed", f"PR P {n}", "press", "a") for n in range(60)]
     path = written(folder / "day.jsonl", entries, 3, IndexKeeper(0))
     parts(path)[0].unlink()
     found = moments.known(path, "12:00:50").known[0]
@@ -145,8 +145,8 @@ def test_a_part_that_was_removed_takes_its_entries_along(folder: Path) -> None:
 def test_a_moment_of_a_long_log_is_found_in_few_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(index, "EVERY", 8_000)
     monkeypatch.setattr(log_parts, "BLOCK", 16_000)
-    entries = [Entry(AT, "log", "session of process 1"), Entry(AT, "output", "early", "press", "a")]
-    entries += [Entry(AT + timedelta(seconds=n), "typed", f"PR P {n}", "press", "a") for n in range(6000)]
+    entries = [LogEntry(AT, "log", "session of process 1"), LogEntry(AT, "output", "early", "press", "a")]
+    entries += [LogEntry(AT + timedelta(seconds=n), "typed", f"PR P {n}", "press", "a") for n in range(6000)]
     path = written(tmp_path / "day.jsonl", entries, 2, IndexKeeper(0))
     read = 0
     opened = log_parts.open_part

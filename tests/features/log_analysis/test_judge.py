@@ -12,7 +12,7 @@ import pytest
 
 from multidrop.features.log_analysis.judge import RULES, judged
 from multidrop.shell.log import files
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 
 Rows = list[dict[str, Any]]
 STOP = {"kind": "stop", "text": "stop of every drive"}
@@ -67,7 +67,7 @@ GOOD: Rows = [
 
 def found(rows: Rows, tmp_path: Path, apart: float = 10.0) -> list[tuple[str, int]]:
     path = tmp_path / "day.jsonl"
-    entries = (Entry(datetime.fromtimestamp(at * apart, UTC), **row) for at, row in enumerate(rows))
+    entries = (LogEntry(datetime.fromtimestamp(at * apart, UTC), **row) for at, row in enumerate(rows))
     path.write_bytes(b"".join(map(line_of, entries)))
     return [(each.rule, each.line.number) for each in judged(files.whole(path)).breaches]
 
@@ -292,7 +292,7 @@ def test_a_session_whose_commands_are_not_marked_is_not_judged(tmp_path: Path) -
     del rows[0]["marks"]
     after_a_stop(rows)
     assert found(rows, tmp_path) == []
-    assert "marks" not in json.loads(line_of(Entry(datetime.now(UTC), "log", "session")))
+    assert "marks" not in json.loads(line_of(LogEntry(datetime.now(UTC), "log", "session")))
 
 
 def test_a_velocity_behind_the_mark_of_a_drive_alone_names_no_drive(tmp_path: Path) -> None:
@@ -329,7 +329,7 @@ def test_a_clock_that_was_set_back_keeps_the_stop_before_what_came_after_it(firs
     path = tmp_path / "day.jsonl"
     hours = [12, 12, 12, *([11] * (len(rows) - 5)), 12, 12]
     entries = (
-        Entry(datetime(2026, 3, 2, hour, at, tzinfo=UTC), **row)
+        LogEntry(datetime(2026, 3, 2, hour, at, tzinfo=UTC), **row)
         for at, (hour, row) in enumerate(zip(hours, rows, strict=True))
     )
     path.write_bytes(b"".join(map(line_of, entries)))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command
@@ -95,7 +95,7 @@ def test_a_moment_as_json_has_its_facts_then_the_lines_of_the_file_then_samples(
     assert [json.loads(fact)["moment"][name] for name in ("session", "since", "stopped")] == ["", None, None]
 
 
-def set_back(times: int) -> tuple[list[Entry], list[str], list[list[str]]]:
+def set_back(times: int) -> tuple[list[LogEntry], list[str], list[list[str]]]:
     """Entries whose clock is set back so often, by 100 s after 10 s each; the times, for a person and for JSON."""
     entries, words, facts = [BEGIN], [], []
     for number in range(times + 1):

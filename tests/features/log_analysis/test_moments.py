@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from multidrop.base.errors import Diagnostic
 from multidrop.features.log_analysis import differences, log_parts, moments
 from multidrop.features.log_analysis.differences import Run, first_difference
-from multidrop.features.log_analysis.moments import BACK, Known, moment
-from multidrop.shell.log.files import Entry, Line, line_of, lines
+from multidrop.features.log_analysis.moments import BACK, KnownMoment, moment
+from multidrop.shell.log.files import LogEntry, LogLine, line_of, lines
 from tests.support.examples import examples
 
 AT = datetime(2026, 11, 22, 12, 0, tzinfo=UTC)
@@ -35,7 +35,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield tmp_path_factory.mktemp("logs")
 
 
-def written(path: Path, entries: Sequence[Entry], parts: int = 1) -> Path:
+def written(path: Path, entries: Sequence[LogEntry], parts: int = 1) -> Path:
     """Write a log in parts, as its rotation leaves them."""
     size = max(1, -(-len(entries) // parts))
     chunks = [entries[begin : begin + size] for begin in range(0, len(entries), size)] or [[]]
@@ -48,37 +48,37 @@ def written(path: Path, entries: Sequence[Entry], parts: int = 1) -> Path:
 
 
 @st.composite
-def logs(draw: st.DrawFn) -> list[Entry]:
+def logs(draw: st.DrawFn) -> list[LogEntry]:
     """The entries of a log: sessions, drives with odd names, polls between."""
-    now, found = AT, [Entry(AT, "log", "session of process 1", marks=True)]
+    now, found = AT, [LogEntry(AT, "log", "session of process 1", marks=True)]
     for _ in range(draw(st.integers(0, 40))):
         now += timedelta(seconds=draw(st.sampled_from([0.0, 0.25, 3.0])))
         kind = draw(st.sampled_from([*KINDS, "sent", "received", "log"]))
         drive = draw(st.sampled_from(["", "a", 'b"', "c\\"]))
         bus = draw(st.sampled_from(["press", 'p"x'])) if drive or draw(st.booleans()) else ""
         if kind == "log":
-            found.append(Entry(now, kind, draw(st.sampled_from(["session of process 2", "part of process 1"]))))
+            found.append(LogEntry(now, kind, draw(st.sampled_from(["session of process 2", "part of process 1"]))))
         else:
             text = "aPR P\n" if kind in ("sent", "received") else draw(TEXTS)
-            found.append(Entry(now, kind, text, bus, drive, poll=kind in ("sent", "received")))
+            found.append(LogEntry(now, kind, text, bus, drive, poll=kind in ("sent", "received")))
     return found
 
 
-def known(path: Path, text: str) -> Known:
+def known(path: Path, text: str) -> KnownMoment:
     """What was known at a time that a log has once."""
     found = moments.known(path, text)
     assert (found.total, found.backs) == (1, [])
     return found.known[0]
 
 
-def shown(found: Sequence[Line]) -> list[Entry]:
+def shown(found: Sequence[LogLine]) -> list[LogEntry]:
     return [line.entry for line in found if line.entry is not None]
 
 
 @examples(15, nightly=500)
 @given(logs(), st.integers(1, 3), st.data())
 def test_the_last_entry_of_each_kind_and_place_is_found(
-    folder: Path, entries: list[Entry], parts: int, data: st.DataObject
+    folder: Path, entries: list[LogEntry], parts: int, data: st.DataObject
 ) -> None:
     path = written(folder / "day.jsonl", entries, parts)
     at = data.draw(st.sampled_from([each.time for each in entries])) + timedelta(seconds=0.1)
@@ -98,22 +98,22 @@ def test_the_last_entry_of_each_kind_and_place_is_found(
 
 def test_a_stop_holds_until_it_is_resumed(folder: Path) -> None:
     entries = [
-        Entry(AT, "log", "session of process 1"),
-        Entry(AT + timedelta(seconds=1), "stop", "stop of every drive"),
-        Entry(AT + timedelta(seconds=2), "typed", "/resume"),
+        LogEntry(AT, "log", "session of process 1"),
+        LogEntry(AT + timedelta(seconds=1), "stop", "stop of every drive"),
+        LogEntry(AT + timedelta(seconds=2), "typed", "/resume"),
     ]
     path = written(folder / "stop.jsonl", entries)
     assert [known(path, f"12:00:0{second}").stopped for second in (0, 1, 2)] == [None, entries[1], None]
 
 
 def test_samples_are_the_last_polls_of_each_drive_with_their_replies(folder: Path) -> None:
-    def poll(after: float, drive: str, sent: str, *received: str) -> Iterator[Entry]:
-        yield Entry(AT + timedelta(seconds=after), "sent", sent, "p", drive, poll=True)
+    def poll(after: float, drive: str, sent: str, *received: str) -> Iterator[LogEntry]:
+        yield LogEntry(AT + timedelta(seconds=after), "sent", sent, "p", drive, poll=True)
         for number, each in enumerate(received):
-            yield Entry(AT + timedelta(seconds=after + 0.01 * (number + 1)), "received", each, "p", drive, poll=True)
+            yield LogEntry(AT + timedelta(seconds=after + 0.01 * (number + 1)), "received", each, "p", drive, poll=True)
 
     entries = [
-        Entry(AT, "log", "session of process 1"),
+        LogEntry(AT, "log", "session of process 1"),
         *poll(1, "a", "PR P\n", "1\r\n"),
         *poll(2, "a", "PR V\n", "2\r\n"),
         *poll(3, "a", "PR P\n", "51", "2\r\n"),
@@ -154,10 +154,10 @@ def test_times(folder: Path) -> None:
             moment(text, first, last)
 
 
-def steps(*times: tuple[datetime, str]) -> list[Entry]:
+def steps(*times: tuple[datetime, str]) -> list[LogEntry]:
     """A session with a line at each time."""
-    head = Entry(times[0][0], "log", "session of process 1", marks=True)
-    return [head, *(Entry(at, "typed", text, "p", "a") for at, text in times)]
+    head = LogEntry(times[0][0], "log", "session of process 1", marks=True)
+    return [head, *(LogEntry(at, "typed", text, "p", "a") for at, text in times)]
 
 
 @pytest.mark.parametrize("parts", [1, 2, 3])
@@ -166,7 +166,7 @@ def test_a_clock_that_was_set_back_passes_a_time_again(folder: Path, parts: int)
         return AT.replace(hour=hour, minute=minute)
 
     entries = steps((clock(10), "1"), (clock(11), "2"), (clock(12), "3"), (clock(11, 5), "4"), (clock(11, 45), "5"))
-    stop, resume = Entry(clock(12), "stop", "stop of every drive"), Entry(clock(11, 4), "typed", "/resume")
+    stop, resume = LogEntry(clock(12), "stop", "stop of every drive"), LogEntry(clock(11, 4), "typed", "/resume")
     path = written(folder / "set.jsonl", [*entries[:4], stop, resume, *entries[4:]], parts)
     for at, texts in {
         "10:30": ["1"],  # the clock passed it once
@@ -208,7 +208,7 @@ def test_a_log_that_is_rotated_meanwhile_is_read_again(folder: Path, monkeypatch
             rotations.pop()
             for number in (1, 0):
                 path.with_name(f"{path.name}.{number}" if number else path.name).rename(f"{path}.{number + 1}")
-            path.write_bytes(line_of(Entry(AT, "typed", "last", "p", "a")))
+            path.write_bytes(line_of(LogEntry(AT, "typed", "last", "p", "a")))
         return opened(part)
 
     for module in (log_parts, differences):
@@ -231,7 +231,7 @@ def test_any_file_is_read_or_refused(folder: Path, data: bytes) -> None:
 
 @examples(15, nightly=500)
 @given(logs(), st.binary(max_size=60).filter(lambda data: b"\n" not in data), st.integers(0, 40))
-def test_a_damaged_line_is_passed_over(folder: Path, entries: list[Entry], junk: bytes, place: int) -> None:
+def test_a_damaged_line_is_passed_over(folder: Path, entries: list[LogEntry], junk: bytes, place: int) -> None:
     path = written(folder / "damaged.jsonl", entries)
     whole = [line.data for line in lines(path)]
     place = min(place, len(whole))
@@ -248,7 +248,7 @@ def test_a_compressed_file_is_named_as_such(folder: Path, begin: bytes) -> None:
             read()
 
 
-def by_place(entries: Sequence[Entry]) -> dict[tuple[str, str], list[tuple[str, str, bool]]]:
+def by_place(entries: Sequence[LogEntry]) -> dict[tuple[str, str], list[tuple[str, str, bool]]]:
     """The steps of the last session, without times and origins."""
     begin = max(n for n, each in enumerate(entries) if each.kind == "log" and each.text.startswith("session"))
     found = defaultdict(list)
@@ -261,10 +261,10 @@ def by_place(entries: Sequence[Entry]) -> dict[tuple[str, str], list[tuple[str, 
 @examples(15, nightly=500)
 @given(logs(), logs() | st.none(), st.data())
 def test_the_first_difference_is_one_of_a_drive_after_equal_lines(
-    folder: Path, entries: list[Entry], others: list[Entry] | None, data: st.DataObject
+    folder: Path, entries: list[LogEntry], others: list[LogEntry] | None, data: st.DataObject
 ) -> None:
     if others is None:  # the same run at another time, with one entry changed or none
-        later = [Entry(each.time + timedelta(hours=3), *tuple_of(each), by="macro") for each in entries]
+        later = [LogEntry(each.time + timedelta(hours=3), *tuple_of(each), by="macro") for each in entries]
         place = data.draw(st.integers(0, len(later)))
         others = later[:place] + later[place + 1 :] if place else later
     logged = entries, others
@@ -288,13 +288,13 @@ def test_the_first_difference_is_one_of_a_drive_after_equal_lines(
     assert steps[0] is None or steps[1] is None or (steps[0].kind, steps[0].text) != (steps[1].kind, steps[1].text)
 
 
-def tuple_of(entry: Entry) -> tuple[str, str, str, str]:
+def tuple_of(entry: LogEntry) -> tuple[str, str, str, str]:
     return entry.kind, entry.text, entry.bus, entry.drive
 
 
 def test_the_line_of_a_step_has_its_number_in_its_part(folder: Path) -> None:
-    entries = [Entry(AT, "log", "session of process 1")]
-    entries += [Entry(AT, "typed", f"MR {number}", "p", "a", by="operator") for number in range(40)]
+    entries = [LogEntry(AT, "log", "session of process 1")]
+    entries += [LogEntry(AT, "typed", f"MR {number}", "p", "a", by="operator") for number in range(40)]
     run = Run(written(folder / "parts.jsonl", entries, 3))
     assert [run.line(index).where for index in (0, 12, 13, 39)] == [
         f"{folder / 'parts.jsonl'}.2:2",
@@ -305,9 +305,9 @@ def test_the_line_of_a_step_has_its_number_in_its_part(folder: Path) -> None:
 
 
 def test_two_drives_may_take_turns_in_another_order(folder: Path) -> None:
-    head = [Entry(AT, "log", "session of process 1")]
-    a = [Entry(AT, "printed", str(number), "p", "a") for number in range(3)]
-    b = [Entry(AT, "printed", str(number), "p", "b") for number in range(3)]
+    head = [LogEntry(AT, "log", "session of process 1")]
+    a = [LogEntry(AT, "printed", str(number), "p", "a") for number in range(3)]
+    b = [LogEntry(AT, "printed", str(number), "p", "b") for number in range(3)]
     one = Run(written(folder / "one.jsonl", [*head, *a, *b]))
     other = Run(written(folder / "other.jsonl", [*head, b[0], a[0], a[1], b[1], b[2], a[2]]))
     assert first_difference(one, other) is None
@@ -344,10 +344,10 @@ def test_two_drives_may_take_turns_in_another_order(folder: Path) -> None:
 def test_the_last_position_of_a_drive_is_decoded_without_the_drive(
     folder: Path, drive: str, polls: list[tuple[str, str]], expected: list[tuple[object, ...]]
 ) -> None:
-    entries = [Entry(AT, "log", "session of process 1")]
+    entries = [LogEntry(AT, "log", "session of process 1")]
     for sent, received in polls:
-        entries.append(Entry(AT, "sent", sent, "p", drive, poll=True))
-        entries.append(Entry(AT, "received", received, "p", drive, poll=True))
+        entries.append(LogEntry(AT, "sent", sent, "p", drive, poll=True))
+        entries.append(LogEntry(AT, "received", received, "p", drive, poll=True))
     motions = known(written(folder / "motion.jsonl", entries), AT.isoformat()).motions
     found = [(each.axis, each.position, each.velocity) for each in motions.get(("p", drive), [])]
     assert [each[: len(wanted)] for each, wanted in zip(found, expected, strict=True)] == expected
@@ -356,7 +356,7 @@ def test_the_last_position_of_a_drive_is_decoded_without_the_drive(
 @pytest.mark.parametrize("size", range(660, 720))
 def test_a_line_that_is_longer_than_a_block_is_passed_over(folder: Path, size: int) -> None:
     log = written(
-        folder / "long.jsonl", [Entry(AT, "log", "session of process 1"), Entry(AT, "typed", "PR P", "p", "a")]
+        folder / "long.jsonl", [LogEntry(AT, "log", "session of process 1"), LogEntry(AT, "typed", "PR P", "p", "a")]
     )
     log.write_bytes(log.read_bytes() + b"x" * (2 * 700) + b"\n" + b"y" * size + b"\n")
     assert [each.text for each in shown(known(log, "12:00:01").lines)] == ["PR P"]
@@ -365,8 +365,8 @@ def test_a_line_that_is_longer_than_a_block_is_passed_over(folder: Path, size: i
 
 def test_a_torn_line_at_the_end_is_no_step(folder: Path) -> None:
     entries = [
-        Entry(AT, "log", "session of process 1"),
-        *(Entry(AT, "typed", each, "p", "a") for each in ("PR P", "S")),
+        LogEntry(AT, "log", "session of process 1"),
+        *(LogEntry(AT, "typed", each, "p", "a") for each in ("PR P", "S")),
     ]
     one, other = written(folder / "one.jsonl", entries), written(folder / "torn.jsonl", entries)
     other.write_bytes(other.read_bytes()[:-9])

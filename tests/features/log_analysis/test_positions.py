@@ -19,7 +19,7 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.features.log_analysis.replay import ReplayReport, replay
 from multidrop.shell.log.decoding import Decoding
-from multidrop.shell.log.steps import Exchange, read
+from multidrop.shell.log.steps import LoggedPoll, read
 from multidrop.shell.log.writer import SessionLog
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.procedure import ProcedureRunner
@@ -168,5 +168,5 @@ def test_no_bytes_in_a_log_break_the_decoding(name: str, polls: list[tuple[bool,
     decoding = Decoding(cast(Drive, SimpleNamespace(state=state)))
     for known, noise, cut in polls:
         sent = first.codec.encode(first) if known else noise
-        poll = Exchange("log:1", AT, "bus", "", sent, REPLIES[name][:cut] + noise)
+        poll = LoggedPoll("log:1", AT, "bus", "", sent, REPLIES[name][:cut] + noise)
         assert all(isinstance(each.position, int) for each in decoding.take(poll))

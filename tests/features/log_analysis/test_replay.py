@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
 from multidrop.features.log_analysis.replay import replay
-from multidrop.shell.log.files import BEGIN, KINDS, Entry, line_of
+from multidrop.shell.log.files import BEGIN, KINDS, LogEntry, line_of
 from multidrop.shell.log.steps import compared, read
 from multidrop.shell.log.writer import SessionLog
 from tests.support.automated import automated
@@ -26,7 +26,7 @@ PRESS = bus("press", party("a"), party("b"))
 
 
 def entry(kind, text, drive="a", bus="press", after=0.0, **more):
-    return Entry(AT + timedelta(seconds=after), kind, text, bus, drive, **more)
+    return LogEntry(AT + timedelta(seconds=after), kind, text, bus, drive, **more)
 
 
 def typed(text, *printed, drive="a", bus="press", failed="", after=0.0, by="operator"):
@@ -260,7 +260,7 @@ WORDS = st.sampled_from(["", "@", "@a", "@a PR P", "/", "/wait", "/sleep 1", "PR
 NAMES = st.sampled_from(["", "a", "press", "*"])
 
 
-@given(st.lists(st.builds(Entry, st.just(AT), st.sampled_from([*KINDS]), WORDS, NAMES, NAMES, raw=st.booleans())))
+@given(st.lists(st.builds(LogEntry, st.just(AT), st.sampled_from([*KINDS]), WORDS, NAMES, NAMES, raw=st.booleans())))
 def test_any_log_is_read_or_refused_in_one_line(entries):
     with TemporaryDirectory() as folder, suppress(Diagnostic):
         found = steps_of(Path(folder), entries)

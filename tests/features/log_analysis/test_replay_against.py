@@ -7,7 +7,7 @@ import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from multidrop.shell.log.files import BEGIN, Entry, line_of
+from multidrop.shell.log.files import BEGIN, LogEntry, line_of
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command
 
@@ -16,13 +16,13 @@ AT = datetime(2026, 11, 22, tzinfo=UTC)
 
 def log(folder: Path, *positions: tuple[float, int]) -> None:
     """A log of a drive that was asked where it is."""
-    entries = [Entry(AT, "log", f"{BEGIN} of process 1")]
+    entries = [LogEntry(AT, "log", f"{BEGIN} of process 1")]
     for after, position in positions:
         at = AT + timedelta(seconds=after)
         entries += [
-            Entry(at, "typed", "@a PR P", "press", "a", "operator"),
-            Entry(at, "sent", "aPR P\n", "press", "a"),
-            Entry(at, "printed", str(position), "press", "a"),
+            LogEntry(at, "typed", "@a PR P", "press", "a", "operator"),
+            LogEntry(at, "sent", "aPR P\n", "press", "a"),
+            LogEntry(at, "printed", str(position), "press", "a"),
         ]
     (folder / "day.log").write_bytes(b"".join(map(line_of, entries)))
     (folder / "cell.toml").write_text(bus("press", party("a")))

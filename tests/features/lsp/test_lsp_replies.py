@@ -11,7 +11,7 @@ from lsprotocol import types
 
 from multidrop.dialects.program_files import Problem
 from multidrop.features.lsp import replies
-from multidrop.features.lsp.replies import Document, Positions
+from multidrop.features.lsp.replies import ColumnConverter, Document
 from multidrop.shell.programs.program_text import ProgramGrammar, ProgramText
 from tests.support.program_texts import TEXTS
 
@@ -30,7 +30,7 @@ def size(text: str, encoding: str) -> int:
 
 @given(st.text(max_size=8), ENCODINGS)
 def test_a_column_is_its_code_units_and_the_reverse(line: str, encoding: str) -> None:
-    positions = Positions(encoding)
+    positions = ColumnConverter(encoding)
     for column in range(len(line) + 1):
         units = positions.units(line, column)
         assert units == size(line[:column], encoding)
@@ -40,13 +40,13 @@ def test_a_column_is_its_code_units_and_the_reverse(line: str, encoding: str) ->
 
 
 def test_utf_16_unless_something_else_was_agreed_on() -> None:
-    assert Positions(None).units("a😀b", 2) == 3 and Positions(None).column("a😀b", 2) == 1
+    assert ColumnConverter(None).units("a😀b", 2) == 3 and ColumnConverter(None).column("a😀b", 2) == 1
 
 
 @given(TEXTS, st.sampled_from(["a.mxt", "a.prg"]), ENCODINGS)
 def test_every_place_of_a_reply_is_in_the_text(text: str, file: str, encoding: str) -> None:
     tested = ProgramText(text, ProgramGrammar(file), "LMDCM")
-    document, positions = Document("file:///a", 1, tested), Positions(encoding)
+    document, positions = Document("file:///a", 1, tested), ColumnConverter(encoding)
     ends = [size(line, encoding) for line in tested.lines]
 
     def inside(place: types.Range) -> bool:
@@ -98,13 +98,13 @@ def test_a_change_of_a_part_is_the_change_of_the_whole(
         lines = re.split(r"\r\n|\r|\n", part)
         places.append(types.Position(len(lines) - 1, size(lines[-1], encoding)))
     change = types.TextDocumentContentChangePartial(types.Range(*places), new)
-    assert Positions(encoding).changed(text, change) == before + new + after
-    assert Positions(encoding).changed(text, types.TextDocumentContentChangeWholeDocument(new)) == new
+    assert ColumnConverter(encoding).changed(text, change) == before + new + after
+    assert ColumnConverter(encoding).changed(text, types.TextDocumentContentChangeWholeDocument(new)) == new
 
 
 @given(PIECES, st.tuples(*[st.integers(0, 2**31 - 1)] * 4))
 def test_a_change_at_any_place_changes_a_part(text: str, numbers: tuple[int, int, int, int]) -> None:
     one, two = types.Position(*numbers[:2]), types.Position(*numbers[2:])
-    found = Positions(None).changed(text, types.TextDocumentContentChangePartial(types.Range(one, two), "NEW"))
+    found = ColumnConverter(None).changed(text, types.TextDocumentContentChangePartial(types.Range(one, two), "NEW"))
     head, _, tail = found.partition("NEW")
     assert text.startswith(head) and text.endswith(tail) and len(head + tail) <= len(text)

@@ -75,4 +75,4 @@ async def test_a_drive_is_a_table_with_what_is_known_of_it(url: str) -> None:
 
 
 def test_long_tables_are_cut() -> None:
-    assert "and 50 more" in pictures.table("t", ["a"], [(str(each),) for each in range(pictures.ROWS + 50)])
+    assert "and 50 more" in pictures.table("t", ["a"], [(str(each),) for each in range(pictures.MOST_ROWS + 50)])

@@ -14,7 +14,7 @@ from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Sample, Valued
 from multidrop.features.plot_files.plot import Plot
 from multidrop.features.plot_files.request import PlotTarget, parse_target
-from multidrop.features.plot_files.rerun_calls import DIFFERS, LINES, PALE, RUNS, drives_of, layout
+from multidrop.features.plot_files.rerun_calls import DIFFERS, LINE_COLOURS, PALE, RUNS, drives_of, layout
 from multidrop.shell.events import Predicted
 from multidrop.shell.plots.batch import TWIN
 from tests.support.plot_file import contents
@@ -49,9 +49,9 @@ async def test_a_drive_has_one_colour_and_the_name_that_a_person_gave(rerun: Any
     await plotted(tmp_path / "run.rrd")
     found = contents(tmp_path / "run.rrd")
     colours = {path: found[path]["SeriesLines:colors"][0][0] for path in found if "SeriesLines:colors" in found[path]}
-    assert {colours[f"/press/a/{word}"] for word in ("position", "velocity")} == {LINES[0]}
-    assert {colours[f"/press/b/{word}"] for word in ("position", "velocity", "I1")} == {LINES[1]}
-    assert colours["/pmx/00/x/position"] not in LINES[:2]
+    assert {colours[f"/press/a/{word}"] for word in ("position", "velocity")} == {LINE_COLOURS[0]}
+    assert {colours[f"/press/b/{word}"] for word in ("position", "velocity", "I1")} == {LINE_COLOURS[1]}
+    assert colours["/pmx/00/x/position"] not in LINE_COLOURS[:2]
     names = [found["/press/a/velocity"]["SeriesLines:names"][0], found["/press/b/I1"]["SeriesLines:names"][0]]
     assert names == [["press:a gantry velocity (steps/s)"], ["press:b I1"]]
 
@@ -66,7 +66,7 @@ async def test_a_colour_stays_when_a_file_is_continued(rerun: Any, tmp_path: Pat
     await plot.close()
     found = contents(tmp_path / "run.rrd")
     colours = [found[f"/press/{each}/position"]["SeriesLines:colors"][-1][0] for each in "abc"]
-    assert colours[:2] == [LINES[0], LINES[1]] and colours[2] not in LINES[:3]
+    assert colours[:2] == [LINE_COLOURS[0], LINE_COLOURS[1]] and colours[2] not in LINE_COLOURS[:3]
 
 
 async def test_states_are_kept_when_they_change_and_a_lost_line_ends_them(rerun: Any, tmp_path: Path) -> None:
@@ -111,13 +111,13 @@ async def plotted_with_twins(path: Path) -> dict[str, dict[str, list[Any]]]:
 async def test_a_twin_has_the_colour_of_its_drive_as_a_pale_band_and_a_name(rerun: Any, tmp_path: Path) -> None:
     found = await plotted_with_twins(tmp_path / "run.rrd")
     own, twin = found["/press/b/position"], found["/press/b/twin/position"]
-    assert own["SeriesLines:colors"][0] == [LINES[1]]
-    assert twin["SeriesLines:colors"][0] == [LINES[1] & ~0xFF | PALE]
+    assert own["SeriesLines:colors"][0] == [LINE_COLOURS[1]]
+    assert twin["SeriesLines:colors"][0] == [LINE_COLOURS[1] & ~0xFF | PALE]
     assert twin["SeriesLines:widths"][0][0] > 2 * own["SeriesLines:widths"][0][0]
     assert twin["SeriesLines:names"][0] == ["press:b clamp twin position (steps)"]
     difference = found["/press/b/twin/difference"]
     assert difference["SeriesLines:names"][0] == ["press:b clamp difference (steps)"]
-    assert difference["SeriesLines:colors"][0] == [LINES[1]]
+    assert difference["SeriesLines:colors"][0] == [LINE_COLOURS[1]]
     assert "/press/a/twin/position" not in found and "/pmx/00/y/twin/velocity" in found
 
 

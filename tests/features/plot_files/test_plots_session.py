@@ -14,7 +14,7 @@ import pytest
 from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
-from multidrop.drives.telemetry import Value
+from multidrop.drives.telemetry import DriveValue
 from multidrop.features.plot_files import plot
 from multidrop.features.plot_files.options import PlotOptions
 from multidrop.features.plot_files.plot import Plot, attach, begin
@@ -146,7 +146,7 @@ class Kept:
 def test_what_is_said_and_polled_on_the_plotted_buses_reaches_the_plot() -> None:
     session, plot = Session(), Kept()
     detach = attach(session, plot, [Series("press", "b"), Series("press", "a"), Series("press", "c", "I1")])  # type: ignore[arg-type]
-    assert session.buses["press"].polled == [("b", "a"), ("b", "a"), (Value("c", "I1"),)]
+    assert session.buses["press"].polled == [("b", "a"), ("b", "a"), (DriveValue("c", "I1"),)]
     assert session.buses["eth"].polled == []
     session.publish(
         Entered(1.0, "/play x", By.OPERATOR),

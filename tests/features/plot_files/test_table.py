@@ -15,7 +15,7 @@ from multidrop.features.plot_files import table
 from multidrop.features.plot_files.plot import Plot, write
 from multidrop.features.plot_files.request import PlotTarget
 from multidrop.features.plot_files.table import COLUMNS
-from multidrop.shell.plots.batch import Batch, Curve
+from multidrop.shell.plots.batch import Batch, PlottedCurve
 from tests.support.plot_file import contents
 
 ENDINGS = ["csv", "parquet"]
@@ -154,7 +154,7 @@ async def test_samples_are_written_into_a_new_file_at_once(ending: str, tmp_path
         pytest.importorskip("rerun")
     path = tmp_path / f"seen.{ending}"
     points = [(0.0, 1.8e9, 5.0), (0.5, 1.8e9 + 0.5, 6.0)]
-    batch = Batch({Curve("press", "b", "", word): points for word in ("position", "velocity")})
+    batch = Batch({PlottedCurve("press", "b", "", word): points for word in ("position", "velocity")})
     await write(PlotTarget(file=path), batch)
     if ending == "csv":
         assert [row["value"] for row in rows(path)] == ["5", "5", "6", "6"]

@@ -15,8 +15,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.features.publishing.broker import parse_target
-from multidrop.features.publishing.plant import LONGEST, MOST, NAME, QUIET, SAMPLES, Place, Plant, Row
-from multidrop.features.publishing.watch import INBOX, Watch, begun, summary
+from multidrop.features.publishing.plant import (
+    LONGEST_PAYLOAD,
+    MOST_DRIVES,
+    NAME,
+    SAMPLES,
+    SIGN_TIMEOUT,
+    Plant,
+    PlantRow,
+    TopicPlace,
+)
+from multidrop.features.publishing.watch import INBOX, PlantWatch, begun, summary
 from multidrop.shell.configuration import Settings
 from multidrop.transports import Unreachable
 from tests.support.until import until
@@ -45,7 +54,7 @@ class Desk:
         self.put(f"{place}/velocity", {"value": 0}, retained)
 
     @property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[PlantRow]:
         return self.plant.rows(self.now)
 
     @property
@@ -115,7 +124,7 @@ def test_an_age_is_by_this_clock_and_that_of_a_retained_message_is_unknown(desk:
     desk.put("plant/p/l/a/position", {"value": 9, "time": "1999-01-01T00:00:00+00:00"})
     desk.now = 5.0
     assert desk.rows[0].age == 2.0 and desk.rows[0].numbers == {"position": "9", "velocity": "0"}
-    assert desk.plant.drives[Place("plant/p", "l", "a")]["velocity", ""].at is None
+    assert desk.plant.drives[TopicPlace("plant/p", "l", "a")]["velocity", ""].at is None
     desk.plant.lost(desk.now)
     assert desk.rows[0].age is None
 
@@ -123,7 +132,7 @@ def test_an_age_is_by_this_clock_and_that_of_a_retained_message_is_unknown(desk:
 def test_a_publisher_that_gives_no_sign_is_missed_and_one_without_drives_has_a_row(desk: Desk) -> None:
     desk.put("plant/p/about", ABOUT, retained=True)
     desk.put("plant/p/status", "online", retained=True)
-    desk.now = QUIET
+    desk.now = SIGN_TIMEOUT
     assert desk.states == [("p::", "not known")]
     desk.now += 1
     assert desk.states == [("p::", "no sign")]
@@ -143,7 +152,7 @@ def test_numbers_of_axes_and_units_are_shown_and_a_cleared_drive_goes(desk: Desk
 
 
 def test_one_drive_is_followed_and_its_samples_are_bounded(desk: Desk) -> None:
-    desk.plant.follow(Place("plant/p", "l", "a"))
+    desk.plant.follow(TopicPlace("plant/p", "l", "a"))
     for number in range(SAMPLES + 50):
         desk.now = number
         desk.drive("plant/p/l/a", position=number)
@@ -166,7 +175,7 @@ GARBAGE = (
     b'{"value": [1]}',
     b'{"value": {}, "axis": 5}',
     b'"text"',
-    b"x" * (LONGEST + 1),
+    b"x" * (LONGEST_PAYLOAD + 1),
 )
 
 
@@ -206,22 +215,22 @@ def test_names_are_cut_and_control_characters_are_written_out(desk: Desk) -> Non
 
 
 def test_millions_of_topics_are_bounded_and_said(desk: Desk) -> None:
-    for number in range(MOST + 500):
+    for number in range(MOST_DRIVES + 500):
         desk.put(f"plant/p/l/{number}/position", {"value": 1})
         desk.put(f"plant/p/{number}/status", "online")
     for number in range(100):
         desk.put("plant/p/l/0/position", {"value": 1, "axis": str(number)})
-    for number in range(MOST):
+    for number in range(MOST_DRIVES):
         desk.put(f"plant/{number}/about", ABOUT)
-    assert len(desk.plant.drives) == len(desk.plant.words) == MOST
-    assert len(desk.plant.publishers) == 1000 and len(desk.plant.drives[Place("plant/p", "l", "0")]) < 40
-    assert desk.plant.ignored[f"beyond {MOST} drives"] > 5000
-    assert f"messages beyond {MOST} drives" in summary(desk.plant, desk.rows)
+    assert len(desk.plant.drives) == len(desk.plant.words) == MOST_DRIVES
+    assert len(desk.plant.publishers) == 1000 and len(desk.plant.drives[TopicPlace("plant/p", "l", "0")]) < 40
+    assert desk.plant.ignored[f"beyond {MOST_DRIVES} drives"] > 5000
+    assert f"messages beyond {MOST_DRIVES} drives" in summary(desk.plant, desk.rows)
 
 
 def test_false_states_hide_no_loss_of_a_pc_that_is_shown(desk: Desk) -> None:
     desk.drive("plant/p/l/a")
-    for number in range(MOST + 1):
+    for number in range(MOST_DRIVES + 1):
         desk.put(f"plant/false/{number}/status", "online")
     desk.put("plant/p/status", "lost")
     assert [row.state for row in desk.rows] == ["PC lost"]
@@ -236,9 +245,9 @@ def test_what_is_beside_the_topic_is_not_taken(desk: Desk) -> None:
 # The connection
 
 
-async def watched(port: int) -> tuple[Watch, list[str]]:
+async def watched(port: int) -> tuple[PlantWatch, list[str]]:
     said: list[str] = []
-    return Watch(parse_target(f"mqtt://127.0.0.1:{port}/plant", "plant"), Settings(), said.append), said
+    return PlantWatch(parse_target(f"mqtt://127.0.0.1:{port}/plant", "plant"), Settings(), said.append), said
 
 
 CONNACK, SUBACK = b"\x20\x02\x00\x00", b"\x90\x03\x00\x01\x00"
@@ -324,7 +333,7 @@ async def test_a_flood_drops_the_oldest_and_says_how_many() -> None:
 async def test_keys_and_signals_come_between_messages_that_take_long(monkeypatch: pytest.MonkeyPatch) -> None:
     watch, _ = await watched(1)
     times = count()
-    monkeypatch.setattr(Watch, "now", property(lambda _: next(times) * 0.04))
+    monkeypatch.setattr(PlantWatch, "now", property(lambda _: next(times) * 0.04))
     for number in range(10):
         watch._take("plant/p/l/a/position", json.dumps({"value": number}).encode(), False)
     watch.drain()

@@ -14,9 +14,9 @@ import pytest
 from textual.pilot import Pilot
 
 from multidrop.features.publishing import screen
-from multidrop.features.publishing.plant import Place
+from multidrop.features.publishing.plant import TopicPlace
 from multidrop.features.publishing.screen import PlantApp, _run
-from multidrop.features.publishing.watch import Watch
+from multidrop.features.publishing.watch import PlantWatch
 from multidrop.shell.configuration import Settings
 from multidrop.tui import boundary
 from multidrop.tui.widgets.lines import Lines
@@ -51,7 +51,7 @@ class Page:
 @asynccontextmanager
 async def page(width: int = 80, state: Path | None = None) -> AsyncIterator[Page]:
     app = PlantApp("mqtt://broker/plant", Settings() if state is None else Settings(state=state))
-    app.broker = Watch(app.target, Settings(), app.tell)
+    app.broker = PlantWatch(app.target, Settings(), app.tell)
     async with app.run_test(size=(width, 24)) as pilot:
         shown = Page(app, pilot)
         shown.put("plant/hall-1/about", {"version": "1", "host": "press-pc", "lines": {"press": "press"}})
@@ -105,7 +105,7 @@ async def test_a_timer_that_fires_while_the_screen_is_taken_down_paints_nothing(
 async def test_one_drive_is_followed_with_the_age_of_each_value() -> None:
     async with page() as plant:
         await plant.press("down", "down", "down", "enter")
-        assert plant.plant.followed == Place("plant/hall-1", "press", "a")
+        assert plant.plant.followed == TopicPlace("plant/hall-1", "press", "a")
         plant.put("plant/hall-1/press/a/position", {"value": 777, "quantity": 1.5, "unit": "mm"})
         plant.put("plant/hall-1/press/b/position", {"value": 4711})
         text = "\n".join(await plant.press("x"))
@@ -174,7 +174,7 @@ async def test_a_signal_ends_the_page_and_leaves_the_terminal_well(
     monkeypatch: pytest.MonkeyPatch, connected: bool
 ) -> None:
     app, ran = PlantApp("mqtt://broker/plant", Settings()), asyncio.Event()
-    app.broker = Watch(app.target, Settings(), app.tell)
+    app.broker = PlantWatch(app.target, Settings(), app.tell)
 
     async def watch_broker(over: asyncio.Event) -> bool:
         if not connected:

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from multidrop.features.publishing.feed import Topics, sensor
-from multidrop.features.publishing.registry import Key, Value
+from multidrop.features.publishing.registry import PublishedValue, ValueKey
 from tests.support.foreign_python import foreign_python
 from tests.support.mosquitto import free_port
 from tests.support.paths import ROOT
@@ -33,9 +33,9 @@ def test_home_assistant_takes_every_sensor() -> None:
     topics, sensors = Topics("plant/hall"), []
     for bus, address, axis in (("press", "a", ""), ("pmx", "", "x"), ("a/b+ü$", "\x01", "")):
         for what in ("position", "velocity", "state", "error"):
-            key = Key(bus, address, what, axis)
+            key = ValueKey(bus, address, what, axis)
             for fields in ({"value": 1}, {"value": 1, "quantity": 0.5, "unit": "mm/s"}):
-                value = Value(0.0, datetime.now(UTC), fields)
+                value = PublishedValue(0.0, datetime.now(UTC), fields)
                 available = topics.status, topics.bus_status(bus)
                 message = sensor(key, value, topics.drive(bus, address, what), available, 0.5, "LMD")
                 sensors.append((message.topic, message.text))

@@ -20,16 +20,16 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from multidrop.features.publishing import broker as broker_module
 from multidrop.features.publishing import publisher as publisher_module
-from multidrop.features.publishing.broker import Connection, Message, parse_target
+from multidrop.features.publishing.broker import BrokerConnection, BrokerMessage, parse_target
 from multidrop.features.publishing.feed import Topics
 from multidrop.features.publishing.login import MqttSettings
-from multidrop.features.publishing.publisher import Publisher
+from multidrop.features.publishing.publisher import MessagePublisher
 from multidrop.transports import Unreachable
 from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
 from tests.support.processes import Running
 from tests.support.until import PATIENCE, until
 
-WILL = Message("t/status", "lost", True)
+WILL = BrokerMessage("t/status", "lost", True)
 
 
 @pytest.fixture(scope="module")
@@ -125,25 +125,25 @@ def test_the_encrypted_form_needs_the_right_authority_and_login_and_sigterm_says
 async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_again(
     mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(publisher_module, "FIRST", 0.05)
-    monkeypatch.setattr(publisher_module, "LONGEST", 0.1)
+    monkeypatch.setattr(publisher_module, "FIRST_PAUSE", 0.05)
+    monkeypatch.setattr(publisher_module, "LONGEST_PAUSE", 0.1)
     target, said = parse_target(f"mqtt://127.0.0.1:{mosquitto.plain}/t"), []
-    made: list[Connection] = []
+    made: list[BrokerConnection] = []
 
-    def make() -> Connection:
-        made.append(Connection(target, MqttSettings(), WILL, "multidrop-t"))
+    def make() -> BrokerConnection:
+        made.append(BrokerConnection(target, MqttSettings(), WILL, "multidrop-t"))
         return made[-1]
 
-    publisher = Publisher(make, Message("t/status", "online", True), said.append, lambda _: None)
+    publisher = MessagePublisher(make, BrokerMessage("t/status", "online", True), said.append, lambda _: None)
     await publisher.begin()
     name = Topics("t").drive("a/b+c#", "$\x01%", "state")
-    publisher.put(Message(name, "moving", True))
+    publisher.put(BrokerMessage(name, "moving", True))
     for number in range(500):
-        publisher.put(Message("t/n", str(number)))
+        publisher.put(BrokerMessage("t/n", str(number)))
     mosquitto.stop()
     await asyncio.wait_for(made[0].lost.wait(), PATIENCE)
     for number in range(500, 1000):
-        publisher.put(Message("t/n", str(number)))
+        publisher.put(BrokerMessage("t/n", str(number)))
     await until(lambda: any("still lost" in each for each in said))
     await asyncio.to_thread(mosquitto.start)
     seen = await asyncio.to_thread(Subscriber, mosquitto.plain)
@@ -154,12 +154,14 @@ async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_a
     assert said[0].startswith("the broker is lost") and said[-1].startswith("the broker is back after")
     assert any("the broker is still lost: no broker at 127.0.0.1:" in each for each in said)
     broken = made[-1]
-    again = Connection(target, MqttSettings(), WILL, "multidrop-t")  # as after a loss that the broker has not seen
+    again = BrokerConnection(
+        target, MqttSettings(), WILL, "multidrop-t"
+    )  # as after a loss that the broker has not seen
     await again.connect()
     await asyncio.wait_for(broken.lost.wait(), PATIENCE)
     await again.close()
     await asyncio.to_thread(seen.until, lambda: seen.texts("t/status")[-2:] == ["lost", "online"])
-    await publisher.end(Message("t/status", "bye", True))
+    await publisher.end(BrokerMessage("t/status", "bye", True))
     await asyncio.to_thread(seen.until, lambda: seen.texts("t/status")[-1] == "bye")
     await asyncio.to_thread(seen.close)
 
@@ -168,7 +170,7 @@ async def test_a_server_that_never_answers_is_given_up_and_nothing_stays(monkeyp
     monkeypatch.setattr(broker_module, "TIMEOUT", 0.2)
     server = socket.create_server(("127.0.0.1", 0))
     port = server.getsockname()[1]
-    connection = Connection(parse_target(f"mqtt://127.0.0.1:{port}/t"), MqttSettings(), WILL, "t")
+    connection = BrokerConnection(parse_target(f"mqtt://127.0.0.1:{port}/t"), MqttSettings(), WILL, "t")
     with pytest.raises(Unreachable, match=f"the broker at 127.0.0.1:{port} does not answer"):
         await connection.connect()
     assert connection.lost.is_set() and not connection.publish(WILL)

@@ -15,10 +15,10 @@ import pytest
 from multidrop import __version__
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Unsolicited
-from multidrop.features.publishing.broker import Message
-from multidrop.features.publishing.command import AGAIN, open_later, open_lines
-from multidrop.features.publishing.feed import BURST, HEARTBEAT, LINES, Feed, Topics
-from multidrop.features.publishing.publisher import Backlog, Publisher
+from multidrop.features.publishing.broker import BrokerMessage
+from multidrop.features.publishing.command import RETRY_AFTER, open_later, open_lines
+from multidrop.features.publishing.feed import BURST, HEARTBEAT, RATE, PublishingFeed, Topics
+from multidrop.features.publishing.publisher import Backlog, MessagePublisher
 from multidrop.features.publishing.registry import Registry
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus
@@ -35,15 +35,15 @@ async def published(
 ) -> AsyncIterator[KeptBroker]:
     """Publish all of a session to a broker in memory."""
     broker, session = KeptBroker(), shop.session
-    publisher = Publisher(
+    publisher = MessagePublisher(
         broker.connection,
-        Message("p/status", "online", True),
+        BrokerMessage("p/status", "online", True),
         lambda text: session.notify(text, warning=True),
         lambda numbers: feed.dropped(numbers),
         backlog,
     )
     registry = Registry(session, period)
-    feed = Feed(registry, publisher, Topics("p"), "", home_assistant)
+    feed = PublishingFeed(registry, publisher, Topics("p"), "", home_assistant)
     registry.outlets.append(feed)
     await feed.begin()
     registry.begin()
@@ -127,7 +127,7 @@ async def test_a_flood_of_prints_is_limited_and_the_rest_is_counted(tmp_path: Pa
         missing = [int(each["text"].split()[0]) for each in entries if each["kind"] == "missing"]
         prints = sum(each["kind"] == "unsolicited" for each in entries)
         assert prints + sum(missing) == 1000
-        assert BURST + 9 * LINES < prints + len(missing) < BURST + 12 * LINES
+        assert BURST + 9 * RATE < prints + len(missing) < BURST + 12 * RATE
         assert entries[-1]["kind"] == "missing"
 
 
@@ -268,10 +268,10 @@ async def test_a_line_that_does_not_reply_is_said_and_opened_later(session: Sess
     assert len(said) == 1 and said[0].startswith(absent) and "c" in said[0] and "every 30 s" in said[0]
     added: list[str] = []
     waiting = asyncio.create_task(open_later(session, absent, lambda each: added.append(each.name)))
-    await asyncio.sleep(2 * AGAIN)
+    await asyncio.sleep(2 * RETRY_AFTER)
     assert added == [] and [*session.buses] == ["press"]
     (tmp_path / "silent.toml").write_text(bus("far", party("c"), baud=0))
-    await asyncio.wait_for(waiting, 3 * AGAIN)
+    await asyncio.wait_for(waiting, 3 * RETRY_AFTER)
     assert added == ["far"] and [*session.buses] == ["press", "far"]
 
 

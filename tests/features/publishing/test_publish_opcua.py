@@ -14,8 +14,8 @@ import pytest_asyncio
 from asyncua import Client, ua
 
 from multidrop.features.publishing.listening import Listening, parse_listening
-from multidrop.features.publishing.opcua import LONGEST, UaServer
-from multidrop.features.publishing.registry import Key, Registry, Value
+from multidrop.features.publishing.opcua import LONGEST_MESSAGE, UaServer
+from multidrop.features.publishing.registry import PublishedValue, Registry, ValueKey
 from tests.support.until import until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")  # one server, which takes a second to begin
@@ -31,8 +31,8 @@ class Values(Registry):
     def warn(self, text: str) -> None:
         raise AssertionError(text)
 
-    def put(self, key: Key, **fields: Any) -> None:
-        self.values[key] = value = Value(0.0, TIME, fields)
+    def put(self, key: ValueKey, **fields: Any) -> None:
+        self.values[key] = value = PublishedValue(0.0, TIME, fields)
         self.outlets[0].value(key, value)
 
 
@@ -68,13 +68,13 @@ async def connected(registry: Values) -> Client:
 async def test_position_speed_state_and_error_of_each_axis_are_read_with_their_time(registry: Values) -> None:
     registry.words["press"] = "online"
     registry.line("press", "online")
-    registry.put(Key("press", "a", "position"), value=51200, axis="", quantity=5.0, unit="mm")
-    registry.put(Key("press", "a", "velocity"), value=-7, axis="")
-    registry.put(Key("press", "a", "error"), value=86, text="stalled", axis="")
+    registry.put(ValueKey("press", "a", "position"), value=51200, axis="", quantity=5.0, unit="mm")
+    registry.put(ValueKey("press", "a", "velocity"), value=-7, axis="")
+    registry.put(ValueKey("press", "a", "error"), value=86, text="stalled", axis="")
     for axis, word in (("x", "moving"), ("y", "at rest")):
-        registry.put(Key("pmx", "", "state", axis), value=word, program="G1")
-        registry.put(Key("pmx", "", "error", axis), value=0, text="")
-    registry.put(Key("press", "a", "state"), value="no current")
+        registry.put(ValueKey("pmx", "", "state", axis), value=word, program="G1")
+        registry.put(ValueKey("pmx", "", "error", axis), value=0, text="")
+    registry.put(ValueKey("press", "a", "state"), value="no current")
     client = await connected(registry)
     try:
         expected = {
@@ -95,20 +95,20 @@ async def test_position_speed_state_and_error_of_each_axis_are_read_with_their_t
         assert {path: each.Value.Value for path, each in found.items()} == expected
         assert all(each.StatusCode.is_good() for each in found.values())
         assert found["press/a/Position"].SourceTimestamp == TIME
-        registry.put(Key("press", "a", "position"), value=9, axis="")
+        registry.put(ValueKey("press", "a", "position"), value=9, axis="")
         assert (await read(client, "press/a/Position")).Value.Value == 9
-        registry.put(Key("press", "a", "state"), value="silent")
+        registry.put(ValueKey("press", "a", "state"), value="silent")
         status = (await read(client, "press/a/Position")).StatusCode
         assert status.name == "UncertainNoCommunicationLastUsableValue"
         assert (await read(client, "press/a/State")).StatusCode.is_good()
-        registry.put(Key("press", "a", "state"), value="at rest")
+        registry.put(ValueKey("press", "a", "state"), value="at rest")
         assert (await read(client, "press/a/Position")).StatusCode.is_good()
     finally:
         await client.disconnect()
 
 
 async def test_a_client_is_told_of_changes(registry: Values) -> None:
-    registry.put(Key("press", "a", "position"), value=1)
+    registry.put(ValueKey("press", "a", "position"), value=1)
     client, seen = await connected(registry), list[int]()
 
     class Handler:
@@ -119,7 +119,7 @@ async def test_a_client_is_told_of_changes(registry: Values) -> None:
         subscription = await client.create_subscription(20, Handler())
         await subscription.subscribe_data_change(client.get_node(f"ns={client.multidrop};s=press/a/Position"))  # type: ignore[attr-defined]
         await until(lambda: seen == [1])
-        registry.put(Key("press", "a", "position"), value=2)
+        registry.put(ValueKey("press", "a", "position"), value=2)
         await until(lambda: seen == [1, 2])
         await subscription.delete()
     finally:
@@ -129,7 +129,7 @@ async def test_a_client_is_told_of_changes(registry: Values) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("user", ["", "admin"])
 async def test_no_client_writes_calls_or_adds_anything(user: str, registry: Values) -> None:
-    registry.put(Key("press", "a", "position"), value=5)
+    registry.put(ValueKey("press", "a", "position"), value=5)
     client = Client(url(registry))
     if user:
         client.set_user(user)
@@ -172,7 +172,7 @@ async def test_a_client_that_announces_a_huge_message_is_cut_off(registry: Value
     writer.write(b"HELF" + (2**31).to_bytes(4, "little"))
     with suppress(ConnectionError):
         for _ in range(100):
-            writer.write(b"x" * (LONGEST // 8))
+            writer.write(b"x" * (LONGEST_MESSAGE // 8))
             await writer.drain()
         assert await reader.read() == b""
     writer.close()

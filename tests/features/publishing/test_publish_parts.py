@@ -18,8 +18,8 @@ from multidrop.base.errors import Diagnostic
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.features.publishing import feed
-from multidrop.features.publishing.broker import Message, Target, parse_target
-from multidrop.features.publishing.feed import BURST, LINES, UNCHANGED, Curve, LineLimit, Topics, escape
+from multidrop.features.publishing.broker import BrokerMessage, Target, parse_target
+from multidrop.features.publishing.feed import BURST, RATE, UNCHANGED, LineLimit, PublishedCurve, Topics, escape
 from multidrop.features.publishing.login import MqttSettings
 from multidrop.features.publishing.publisher import Backlog
 from multidrop.features.publishing.registry import (
@@ -28,13 +28,13 @@ from multidrop.features.publishing.registry import (
     MOVING,
     NO_CURRENT,
     DriveValues,
+    PublishedValue,
     SampleLimit,
-    Value,
     error_of,
     parse_rate,
 )
 from multidrop.shell import configuration
-from multidrop.shell.log.files import Entry
+from multidrop.shell.log.files import LogEntry
 
 # Topics
 
@@ -169,8 +169,8 @@ def test_a_poll_that_comes_a_little_early_passes() -> None:
 
 
 def test_a_value_that_rests_is_published_every_few_seconds_and_a_change_with_the_point_before_it() -> None:
-    curve = Curve()
-    points = [Value(at / 2, datetime.now(UTC), {"value": 0 if at < 24 else at}) for at in range(27)]
+    curve = PublishedCurve()
+    points = [PublishedValue(at / 2, datetime.now(UTC), {"value": 0 if at < 24 else at}) for at in range(27)]
     published = [point.at for each in points for point in curve.take(each)]
     assert published == [0.0, UNCHANGED, 2 * UNCHANGED, 11.5, 12.0, 12.5, 13.0]
 
@@ -178,7 +178,7 @@ def test_a_value_that_rests_is_published_every_few_seconds_and_a_change_with_the
 def test_a_flood_of_lines_is_limited_and_what_is_missing_is_counted() -> None:
     limit = LineLimit()
     passed = sum(limit.passes(second / 1000) for second in range(10_000))
-    assert passed == pytest.approx(BURST + 10 * LINES, abs=2)
+    assert passed == pytest.approx(BURST + 10 * RATE, abs=2)
     assert limit.missing(9.999) == 0  # there is no room for the line that says it
     assert limit.missing(10.1) == 10_000 - passed
     assert limit.missing(20.0) == 0
@@ -190,17 +190,17 @@ def test_a_flood_of_lines_is_limited_and_what_is_missing_is_counted() -> None:
 def test_the_oldest_message_is_dropped_and_counted_by_its_line() -> None:
     backlog = Backlog(3)
     for number, bus in enumerate("aabba"):
-        backlog.put(Message(str(number), "", bus=bus))
-    assert (len(backlog), backlog.dropped, backlog.first()) == (3, 2, Message("2", "", bus="b"))
+        backlog.put(BrokerMessage(str(number), "", bus=bus))
+    assert (len(backlog), backlog.dropped, backlog.first()) == (3, 2, BrokerMessage("2", "", bus="b"))
     assert backlog.take_dropped() == Counter(a=2)
     assert backlog.dropped == 0
-    backlog.give_back([Message("x", "")])
+    backlog.give_back([BrokerMessage("x", "")])
     assert backlog.take_dropped() == Counter({"": 1})  # the oldest of all
 
 
 def test_retained_messages_are_renewed_and_the_newest_is_the_last() -> None:
     backlog = Backlog()
-    old, new, line = Message("s", "old", True), Message("s", "new", True), Message("t", "1")
+    old, new, line = BrokerMessage("s", "old", True), BrokerMessage("s", "new", True), BrokerMessage("t", "1")
     for each in (old, line, new):
         backlog.put(each)
     for _ in range(3):
@@ -251,7 +251,7 @@ def test_a_line_that_is_named_after_its_host_is_shown_with_its_port(name: str, p
 
 
 def test_a_line_is_an_entry_of_the_log_without_secrets_and_of_bounded_length() -> None:
-    entry = Entry(datetime.now(UTC), "printed", "password = x\n" + "y" * 5000, "press", "a")
+    entry = LogEntry(datetime.now(UTC), "printed", "password = x\n" + "y" * 5000, "press", "a")
     text = feed.line_text(entry)
     found = json.loads(text)
     assert (found["kind"], found["bus"], found["drive"]) == ("printed", "press", "a")

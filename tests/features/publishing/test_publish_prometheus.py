@@ -17,8 +17,8 @@ from prometheus_client.parser import text_string_to_metric_families
 from multidrop.base.errors import Diagnostic
 from multidrop.features.publishing import prometheus
 from multidrop.features.publishing.listening import Listening, parse_listening
-from multidrop.features.publishing.prometheus import CLIENTS, Endpoint
-from multidrop.features.publishing.registry import Key, Registry, Value
+from multidrop.features.publishing.prometheus import CLIENTS, MetricsServer
+from multidrop.features.publishing.registry import PublishedValue, Registry, ValueKey
 from multidrop.transports import Unreachable
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
@@ -45,10 +45,10 @@ def read(answer: bytes) -> dict[tuple[str, str], float]:
 
 
 @asynccontextmanager
-async def served(shop: CellSession) -> AsyncIterator[Endpoint]:
+async def served(shop: CellSession) -> AsyncIterator[MetricsServer]:
     registry = Registry(shop.session, 0.5)
     registry.begin()
-    yield Endpoint(registry, HERE)
+    yield MetricsServer(registry, HERE)
     registry.end()
 
 
@@ -92,12 +92,12 @@ async def test_the_numbers_of_a_drive_without_power_are_left_out_and_a_lost_line
 async def test_any_name_is_a_label_that_the_parser_takes(names: list[str]) -> None:
     class Named:
         words = {names[0]: "online"}
-        values = {Key(names[0], names[1], "position"): Value(0.0, datetime.now(UTC), {"value": 7})}
+        values = {ValueKey(names[0], names[1], "position"): PublishedValue(0.0, datetime.now(UTC), {"value": 7})}
 
-        def current(self, key: Key) -> bool:
+        def current(self, key: ValueKey) -> bool:
             return True
 
-    endpoint = Endpoint(Named(), HERE)  # type: ignore[arg-type]
+    endpoint = MetricsServer(Named(), HERE)  # type: ignore[arg-type]
     assert [value for (name, _), value in read(endpoint.answer(GET)).items() if name == "position"] == [7]
 
 
@@ -115,7 +115,7 @@ async def test_nothing_can_be_written_and_other_paths_are_not_there(tmp_path: Pa
 async def test_a_client_that_says_nothing_or_too_much_is_hung_up_on_and_others_are_served(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(prometheus, "PATIENCE", 0.3)
+    monkeypatch.setattr(prometheus, "REQUEST_TIMEOUT", 0.3)
     async with CellSession(tmp_path, bus("press", party("a"))) as shop, served(shop) as endpoint:
         await endpoint.listen()
         place = parse_listening(endpoint.text)

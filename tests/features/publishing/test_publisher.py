@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.features.publishing.broker import Message
-from multidrop.features.publishing.publisher import DRAIN, LONGEST, REMIND, Backlog, Publisher
+from multidrop.features.publishing.broker import BrokerMessage
+from multidrop.features.publishing.publisher import DRAIN, LONGEST_PAUSE, REMIND, Backlog, MessagePublisher
 from multidrop.transports import Unreachable
 from tests.support.kept_broker import KeptBroker
 from tests.support.virtual import in_virtual_time
 
 pytestmark = pytest.mark.virtual
-ONLINE, BYE = Message("p/status", "online", True), Message("p/status", "bye", True)
+ONLINE, BYE = BrokerMessage("p/status", "online", True), BrokerMessage("p/status", "bye", True)
 
 
 class Desk:
@@ -27,12 +27,14 @@ class Desk:
         self.broker = KeptBroker(window)
         self.said: list[str] = []
         self.dropped: Counter[str] = Counter()
-        self.publisher = Publisher(self.broker.connection, ONLINE, self.said.append, self.dropped.update, Backlog(most))
+        self.publisher = MessagePublisher(
+            self.broker.connection, ONLINE, self.said.append, self.dropped.update, Backlog(most)
+        )
 
     def put(self, *numbers: int) -> None:
         """Publish numbers."""
         for number in numbers:
-            self.publisher.put(Message("p/n", str(number), bus="press"))
+            self.publisher.put(BrokerMessage("p/n", str(number), bus="press"))
 
     @property
     def numbers(self) -> list[int]:
@@ -82,7 +84,7 @@ async def test_a_lost_broker_is_tried_again_with_back_off_and_each_reason_is_sai
     desk.broker.cut()
     await asyncio.sleep(400)
     gaps = [round(each - begin) for each in desk.broker.attempts[1:]]
-    assert gaps == [1, 3, 7, 15, 31, 61, 91, 121, 151, 181] and LONGEST == 30
+    assert gaps == [1, 3, 7, 15, 31, 61, 91, 121, 151, 181] and LONGEST_PAUSE == 30
     assert [each.split(";")[0] for each in desk.said] == [
         "the broker is lost",
         "the broker is still lost: refused",
@@ -94,7 +96,7 @@ async def test_a_lost_broker_is_tried_again_with_back_off_and_each_reason_is_sai
 
 async def test_what_waited_arrives_in_order_and_then_the_retained_states_again(desk: Desk) -> None:
     await desk.publisher.begin()
-    desk.publisher.put(Message("p/a/state", "moving", True, "press"))
+    desk.publisher.put(BrokerMessage("p/a/state", "moving", True, "press"))
     desk.put(1)
     desk.broker.acknowledges = False
     desk.put(2, 3)  # sent, and not acknowledged
@@ -143,7 +145,7 @@ async def test_a_retained_message_that_was_dropped_is_sent_again_once_there_is_r
     desk.broker.acknowledges = False
     await desk.publisher.begin()
     desk.put(0)
-    desk.publisher.put(Message("p/a/state", "moving", True, "press"))
+    desk.publisher.put(BrokerMessage("p/a/state", "moving", True, "press"))
     desk.put(*range(1, 9))
     assert desk.broker.retained() == {}
     desk.broker.acknowledges = True

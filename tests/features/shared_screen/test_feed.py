@@ -12,7 +12,7 @@ import pytest
 
 from multidrop.base.errors import Stopped
 from multidrop.features.shared_screen import feed
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import By
 from tests.support.cell_session import CellSession, bus, party
 
@@ -31,8 +31,8 @@ async def test_a_watchers_stop_stops_every_drive_and_latches_macros_and_scripts(
         app: Any = SimpleNamespace(
             session=session, presenter=SimpleNamespace(notes=[], on_records={}), stop_ahead=session.stop_ahead
         )
-        feed.Feed(app, tmp_path)
-        session.macros.save(Macro("m", (Step(0.0, "@press:b SL 50000"), Step(0.0, "/sleep 100"))))
+        feed.ScreenFeed(app, tmp_path)
+        session.macros.save(Macro("m", (MacroStep(0.0, "@press:b SL 50000"), MacroStep(0.0, "/sleep 100"))))
         await session.run("@gantry:c SL 5000")
         playing = asyncio.create_task(session.run("/play m"))
         await asyncio.sleep(1.0)

@@ -19,9 +19,9 @@ import pytest
 import multidrop
 from multidrop.base.errors import Diagnostic
 from multidrop.features.shared_screen import host as host_side
-from multidrop.features.shared_screen.host import MOST, WAITING, Calls, Gate, Watcher
+from multidrop.features.shared_screen.host import MOST_WATCHERS, WAITING, Gate, GateCalls, Watcher
 from multidrop.features.shared_screen.join import Stops, connect, joined
-from multidrop.features.shared_screen.wire import Dropped, Heard, Item, Items, Now, greeting, line
+from multidrop.features.shared_screen.wire import Dropped, Item, Items, Now, StopHeard, greeting, line
 from multidrop.transports import Unreachable
 from tests.support.until import PATIENCE, until
 
@@ -38,7 +38,9 @@ class Shared:
         self.refused: list[str] = []
         self.left: list[str] = []
         self.behind: list[Watcher] = []
-        calls = Calls(self._ahead, self.stops.append, self._joined, self.behind.append, self._left, self.refused.append)
+        calls = GateCalls(
+            self._ahead, self.stops.append, self._joined, self.behind.append, self._left, self.refused.append
+        )
         self.gate = Gate(folder, asyncio.get_running_loop(), calls)
 
     def _ahead(self) -> None:
@@ -201,28 +203,28 @@ async def test_a_watcher_that_reads_nothing_costs_bounded_memory_and_is_told_wha
 
 
 async def test_more_watchers_than_there_may_be_are_refused(shared: Shared) -> None:
-    peers = [plain(shared, greeting()) for _ in range(MOST)]
-    await until(lambda: len(shared.gate.watchers) == MOST)
+    peers = [plain(shared, greeting()) for _ in range(MOST_WATCHERS)]
+    await until(lambda: len(shared.gate.watchers) == MOST_WATCHERS)
     late = plain(shared, greeting())
     assert (await asyncio.to_thread(to_end, late)) == greeting()
     await until(lambda: shared.refused)
-    assert shared.refused == [f"a watcher was refused: more than {MOST} watchers at a time"]
+    assert shared.refused == [f"a watcher was refused: more than {MOST_WATCHERS} watchers at a time"]
     for each in peers:
         each.close()
-    await until(lambda: len(shared.left) == MOST + 1)
+    await until(lambda: len(shared.left) == MOST_WATCHERS + 1)
 
 
 async def test_connections_that_never_greet_keep_no_watcher_out(shared: Shared) -> None:
-    silent = [plain(shared, b"" if number % 2 else b"multidrop-scr") for number in range(3 * MOST)]
+    silent = [plain(shared, b"" if number % 2 else b"multidrop-scr") for number in range(3 * MOST_WATCHERS)]
     true = plain(shared, greeting())
     await until(lambda: shared.gate.watchers)
-    more = [plain(shared, b"") for _ in range(2 * MOST)]
+    more = [plain(shared, b"") for _ in range(2 * MOST_WATCHERS)]
     second = plain(shared, greeting())
     await until(lambda: len(shared.gate.watchers) == 2)
     true.sendall(b"\x18")
     await until(lambda: shared.stops)
     assert shared.ahead == 1 and shared.refused == []
-    await until(lambda: len(shared.left) >= 4 * MOST)  # the oldest were closed
+    await until(lambda: len(shared.left) >= 4 * MOST_WATCHERS)  # the oldest were closed
     for each in (*silent, *more, true, second):
         each.close()
 
@@ -288,7 +290,7 @@ async def test_the_relay_passes_bytes_both_ways_until_either_end(shared: Shared)
     async with asyncio.timeout(PATIENCE):
         assert await process.stdout.readline() == greeting()
         process.stdin.write(greeting() + b"\x18")
-        assert Items((Heard,)).take(await process.stdout.readline()) == [Item(Heard(1))]
+        assert Items((StopHeard,)).take(await process.stdout.readline()) == [Item(StopHeard(1))]
         process.stdin.close()
         assert await process.wait() == 0
     await until(lambda: shared.left)

@@ -14,17 +14,17 @@ from textual import events
 from textual.pilot import Pilot
 
 from multidrop.drives.stopping import Fate
-from multidrop.features.shared_screen.feed import Feed, Shared, SharedBus, SharedDrive, sharing
+from multidrop.features.shared_screen.feed import ScreenFeed, Shared, SharedBus, SharedDrive, sharing
 from multidrop.features.shared_screen.join import joined
 from multidrop.features.shared_screen.mirror import watch
 from multidrop.features.shared_screen.wire import Dropped, Item, line
 from multidrop.shell.configuration import Settings
 from multidrop.shell.roles import Series
 from multidrop.shell.secrets import without_secrets
-from multidrop.shell.stop_report import Found, headline
+from multidrop.shell.stop_report import DriveFate, headline
 from multidrop.transports.relay_pipe import SocketStream
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.curves.samples import Quantity
+from multidrop.tui.curves.samples import TraceQuantity
 from multidrop.tui.screen_model import Record
 from tests.support.fake_session import painted, readable
 from tests.support.real_screen import real_app
@@ -41,7 +41,7 @@ class Pair(NamedTuple):
     watcher: MultidropApp
     pilot: Pilot[int]
     connection: SocketStream
-    feed: Feed
+    feed: ScreenFeed
 
     async def until(self, true: Callable[[], object]) -> None:
         """Let both work until a condition holds."""
@@ -103,7 +103,7 @@ async def test_a_watcher_sees_and_stops_what_the_host_has() -> None:
         await pair.until(lambda: any("error 23" in text for text in texts(watcher)))
         said = "".join(each.text for each in watcher.last_records(100))
         assert "tcp://***@127.0.0.1:1" in said and "secret" not in said and "PASSWORD" not in said
-        quantity = Quantity("press", "a", "", "position")
+        quantity = TraceQuantity("press", "a", "", "position")
         await pair.until(lambda: watcher.model.traces.get(quantity) is not None)
         own, other = (app.model.traces.get(quantity) for app in (pair.host, watcher))
         assert own is not None and other is not None
@@ -263,7 +263,7 @@ async def test_buses_drives_and_selection_follow_the_host_until_a_watcher_choose
 async def test_what_was_dropped_and_a_stop_of_another_are_said(tmp_path: Path) -> None:
     async with fed(tmp_path) as (wire, app, pilot):
         await pilot.press(*"MR 5")
-        found = (Found(Fate.SENT, "a", "press"),)
+        found = (DriveFate(Fate.SENT, "a", "press"),)
         wire.feed(Dropped(812), STATE._replace(stops=1, stopped_at=1.0, latched=True, found=found))
         await until(lambda: app.session.latched)
         assert app.session.stops == 1 and app.session.tally().found == found

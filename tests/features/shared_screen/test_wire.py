@@ -13,21 +13,21 @@ from multidrop.dialects.values import Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.drives.stopping import Fate
 from multidrop.features.shared_screen.wire import (
-    LONGEST,
-    Garbled,
-    Heard,
+    LONGEST_MESSAGE_LINE,
+    GarbledMessage,
     Item,
     Items,
     Now,
+    StopHeard,
     greeted,
     greeting,
     line,
     other_version,
 )
 from multidrop.shell.events import By, Entered, Phase, ProgramSeen
-from multidrop.shell.stop_report import Found
+from multidrop.shell.stop_report import DriveFate
 
-TYPES = (Sample, Conditioned, Silent, Entered, ProgramSeen, Found, Heard, Now)
+TYPES = (Sample, Conditioned, Silent, Entered, ProgramSeen, DriveFate, StopHeard, Now)
 TEXTS = st.text('ab1 é\x1b\u2028\n"', max_size=12)
 VALUES = st.one_of(
     st.builds(Sample, st.floats(), TEXTS, st.integers(), st.integers(), TEXTS, TEXTS, st.none() | st.booleans()),
@@ -48,8 +48,8 @@ VALUES = st.one_of(
     ),
     st.builds(Entered, st.floats(), TEXTS, st.sampled_from(By)),
     st.builds(ProgramSeen, st.floats(), TEXTS, TEXTS, st.none() | st.integers(), st.sampled_from(Phase)),
-    st.builds(Found, st.sampled_from(Fate), TEXTS, TEXTS),
-    st.builds(Heard, st.integers()),
+    st.builds(DriveFate, st.sampled_from(Fate), TEXTS, TEXTS),
+    st.builds(StopHeard, st.integers()),
 )
 JSON = st.recursive(
     st.none()
@@ -62,12 +62,12 @@ JSON = st.recursive(
 
 
 def test_a_line_is_json_of_type_bus_and_fields() -> None:
-    items = [Item(Sample(1.5, "a", 51200, -7, program=True), "press"), Item(Heard(2))]
+    items = [Item(Sample(1.5, "a", 51200, -7, program=True), "press"), Item(StopHeard(2))]
     data = line(items)
     assert data == b'[["Sample","press",[1.5,"a",51200,-7,"","",true]],["Heard","",[2]]]\n'
     assert Items(TYPES).take(data) == items
     assert (
-        line([Item(Found(Fate.NOT_REACHED, "a", "press", "lost"))])
+        line([Item(DriveFate(Fate.NOT_REACHED, "a", "press", "lost"))])
         == b'[["Found","",["NOT_REACHED","a","press","lost"]]]\n'
     )
 
@@ -86,7 +86,7 @@ def test_items_arrive_as_they_were_sent_whatever_the_pieces(items: list[Item], s
 def test_anything_else_is_garbled_and_nothing_worse(data: bytes) -> None:
     try:
         found = Items(TYPES).take(data + b"\n")
-    except Garbled:
+    except GarbledMessage:
         return
     assert all(isinstance(each.value, TYPES) for each in found)
 
@@ -103,13 +103,13 @@ WRONG = (
     b'[["Heard",null,[1]]]\n',
     b'[["Found","",["GONE","a","b",""]]]\n',
     b'[["Sample","",{"at":1}]]\n',
-    b"[" + b" " * LONGEST,
+    b"[" + b" " * LONGEST_MESSAGE_LINE,
 )
 
 
 def test_each_wrong_line_is_refused() -> None:
     for data in WRONG:
-        with pytest.raises(Garbled):
+        with pytest.raises(GarbledMessage):
             Items(TYPES).take(data)
 
 
@@ -127,5 +127,5 @@ def test_a_greeting_has_version_and_name_and_another_version_is_refused_with_bot
     told = other_version("9.9", "pc")
     assert told == f"pc is multidrop 9.9, this is {multidrop.__version__}; install one version on both sides"
     for wrong in (b"", b"SSH-2.0\n", b"multidrop-screen\n", b"multidrop-screen 1 " + b"a" * 300):
-        with pytest.raises(Garbled):
+        with pytest.raises(GarbledMessage):
             greeted(wrong)

@@ -16,7 +16,7 @@ from multidrop.families.pmx.simulator.device import PmxPort
 from multidrop.families.tmcl.host import codec
 from multidrop.families.tmcl.manual import commands
 from multidrop.features.sharing.stop_bytes import stop_bytes
-from multidrop.features.sharing.writer_turns import SILENT, Exchange, Say, Write
+from multidrop.features.sharing.writer_turns import WRITER_TIMEOUT, ClientWrite, PortClients, Say
 from tests.support.examples import examples
 from tests.support.lexium import drive
 from tests.support.pmx_controller import Bench
@@ -96,11 +96,11 @@ def shared(
     if leaves:
         port.do(port.exchange.leave(ADA))
     else:
-        far.now += SILENT + 1.0
+        far.now += WRITER_TIMEOUT + 1.0
     for data in following:
         send(BOB, data)
     if not leaves:
-        far.now += SILENT + 1.0
+        far.now += WRITER_TIMEOUT + 1.0
         send(ADA, more)
     first = b"".join(reads) + (b"" if leaves else more)
     whole = lines_of(first) | lines_of(b"".join(following))
@@ -195,13 +195,13 @@ def test_a_tmcl_module_executes_no_frame_of_two_writers(
 def test_bytes_that_the_port_dropped_leave_a_doubt_only_where_nothing_follows_that_makes_a_line_harmless() -> None:
     stops = stop_bytes("")
     for purged in (False, True):
-        exchange = Exchange(stops, 9600)
+        exchange = PortClients(stops, 9600)
         for count, words in (
             (1, "1 byte that had not left was dropped"),
             (3, "3 bytes that had not left were dropped"),
         ):
             assert exchange.dropped(count, *([True, 1.0] if purged else [])) == [Say("", "unsent", words)]
         assert exchange.dropped(0) == []
-        assert [each.data for each in exchange.over() if isinstance(each, Write)] == (
+        assert [each.data for each in exchange.over() if isinstance(each, ClientWrite)] == (
             [stops.harmless(True)] if purged else []
         )

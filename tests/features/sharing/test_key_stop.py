@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.dialects import StopPiece
 from multidrop.drives import pacing
-from multidrop.features.sharing.key_stop import AGAIN, KeyStop, pause
+from multidrop.features.sharing.key_stop import LOOK_PERIOD, KeyStop, pause
 from multidrop.features.sharing.stop_bytes import StopBytes, stop_bytes
 
 PIECES = (StopPiece(b"AAAA"), StopPiece(b"BB", 0.1), StopPiece(b"C", 0.5))
@@ -71,9 +71,9 @@ def test_the_pieces_are_written_at_their_times_and_none_while_bytes_wait(port: P
     assert port.go_on(0.0999) == pytest.approx(0.0001)
     assert port.written == [b"AAAA"]
     port.waiting = 1
-    assert port.go_on(0.0002) == AGAIN and port.written == [b"AAAA"]
+    assert port.go_on(0.0002) == LOOK_PERIOD and port.written == [b"AAAA"]
     port.waiting = 0
-    assert port.go_on(AGAIN) == 0.5 and port.written == [b"AAAA", b"BB"]
+    assert port.go_on(LOOK_PERIOD) == 0.5 and port.written == [b"AAAA", b"BB"]
     assert port.go_on(0.5) == -1.0 and port.written == [b"AAAA", b"BB", b"C"]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pytest
 
-from multidrop.features.sharing.server import AGAIN, Narrator
+from multidrop.features.sharing.server import REFUSAL_PERIOD, Narrator
 from multidrop.features.sharing.writer_turns import Say
 
 Shown = Callable[..., bool]
@@ -40,9 +40,9 @@ def shown(clock: list[float], capsys: pytest.CaptureFixture[str]) -> Shown:
 def test_a_client_that_is_refused_again_and_again_is_said_once_in_ten_seconds(shown: Shown) -> None:
     assert shown(100.0, "10.0.0.5:1000", "refused")
     assert not shown(101.0, "10.0.0.5:1001", "refused")
-    assert not shown(100.0 + AGAIN - 0.1, "10.0.0.5:1002", "refused")
-    assert shown(100.0 + AGAIN, "10.0.0.5:1003", "refused")
-    assert not shown(100.0 + AGAIN + 0.1, "10.0.0.5:1004", "connected")
+    assert not shown(100.0 + REFUSAL_PERIOD - 0.1, "10.0.0.5:1002", "refused")
+    assert shown(100.0 + REFUSAL_PERIOD, "10.0.0.5:1003", "refused")
+    assert not shown(100.0 + REFUSAL_PERIOD + 0.1, "10.0.0.5:1004", "connected")
 
 
 @pytest.mark.parametrize("event", ["connected", "left", "refused", "lost"])

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.text import visible
 from multidrop.features.sharing.stop_bytes import stop_bytes
-from multidrop.features.sharing.writer_turns import SILENT, Close, Exchange, Send, Stop, Write
+from multidrop.features.sharing.writer_turns import WRITER_TIMEOUT, ClientWrite, Close, PortClients, Send, Stop
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, Setting, message
 from tests.support.shared_exchange import ADA, BOB, DAN, EVE, MST, ROR, Port
@@ -34,7 +34,7 @@ def test_every_client_hears_what_the_drives_send_but_one_that_was_refused(port: 
 def test_after_ten_seconds_of_silence_another_writes_and_the_first_is_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r", 1.0)
     port.send(ADA, b"PR V\r", 5.0)
-    assert port.exchange.deadline == 5.0 + SILENT
+    assert port.exchange.deadline == 5.0 + WRITER_TIMEOUT
     port.do(port.exchange.advance(14.9))
     assert port.exchange.writer == ADA
     port.do(port.exchange.advance(15.0))
@@ -449,7 +449,7 @@ STEPS = st.lists(st.tuples(st.integers(0, 2), PIECES, st.floats(0, 15)), max_siz
 
 @given(STEPS, st.integers(0, 20))
 def test_only_the_writer_writes_and_every_stop_passes(steps: list[tuple[int, bytes, float]], dropped: int) -> None:
-    exchange, now = Exchange(stop_bytes(""), 9600), 0.0
+    exchange, now = PortClients(stop_bytes(""), 9600), 0.0
     closed: set[int] = set()
     writer, last = -1, 0.0
     for client in range(3):
@@ -463,9 +463,9 @@ def test_only_the_writer_writes_and_every_stop_passes(steps: list[tuple[int, byt
             actions += exchange.advance(now)
         for each in actions:
             match each:
-                case Write(by, written):
+                case ClientWrite(by, written):
                     assert by == client and by not in closed
-                    assert by == writer or writer < 0 or writer in closed or now >= last + SILENT
+                    assert by == writer or writer < 0 or writer in closed or now >= last + WRITER_TIMEOUT
                     assert written in (OVERFLOW, STOPPED) or _left_of(written, begun + data)
                     writer, last = by, now
                 case Close(by):
@@ -486,6 +486,6 @@ def _left_of(written: bytes, data: bytes) -> bool:
     return all(byte in rest for byte in written)
 
 
-def _in_telnet(exchange: Exchange, client: int) -> bool:
+def _in_telnet(exchange: PortClients, client: int) -> bool:
     """A telnet command that has begun takes what follows."""
     return exchange.clients[client]._telnet is not None

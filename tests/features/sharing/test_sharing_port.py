@@ -18,10 +18,10 @@ import serial
 from multidrop.base.errors import TransportLost
 from multidrop.drives import pacing
 from multidrop.features.sharing import key_stop, server
-from multidrop.features.sharing.client import Client, Input, Request
+from multidrop.features.sharing.client import ClientRequest, ClientStream, Input
 from multidrop.features.sharing.server import SharedPort
 from multidrop.features.sharing.stop_bytes import stop_bytes
-from multidrop.features.sharing.writer_turns import NOT_REACHED, TURN, Say, Write
+from multidrop.features.sharing.writer_turns import NOT_REACHED, WRITES_A_TURN, ClientWrite, Say
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.transports import Unreachable, telnet
@@ -170,7 +170,7 @@ async def test_our_own_client_is_told_why_it_is_refused(shared: Shared) -> None:
 async def test_a_client_that_does_not_read_is_dropped_and_the_others_are_served(
     shared: Shared, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "UNREAD", 4096)
+    monkeypatch.setattr(server, "MOST_UNREAD_BYTES", 4096)
     with socket.create_connection(("127.0.0.1", shared.number)) as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
         hears, ada = await shared.client()
@@ -187,7 +187,7 @@ async def test_a_client_that_never_reads_its_last_bytes_is_cut_off(monkeypatch: 
     monkeypatch.setattr(server, "LINGER", 0.01)
     stuck = Mock(spec=asyncio.Transport)
     stuck.get_extra_info.return_value, stuck.is_closing.return_value = None, False
-    connection = server.Connection(Mock())
+    connection = server.ClientConnection(Mock())
     connection.connection_made(stuck)
     connection.say_goodbye(b"refused")
     await until(lambda: stuck.abort.called)
@@ -197,7 +197,7 @@ async def test_a_client_that_never_reads_its_last_bytes_is_cut_off(monkeypatch: 
 async def test_a_writer_that_is_too_far_ahead_of_the_line_is_dropped_and_a_stop_still_passes(
     shared: Shared, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(server, "AHEAD", 4096)
+    monkeypatch.setattr(server, "MOST_BYTES_AHEAD", 4096)
     (_, ada), (_, bob) = await shared.client(), await shared.client()
     ada.write(b"x" * 100_000)
     await until(lambda: "writes" in shared.events())
@@ -305,7 +305,7 @@ async def test_its_thread_makes_a_line_that_a_client_has_begun_harmless(
     ada.write(b"MR 5")
     await shared.line.got(b"MR 5")
     assert pressed(shared) == stop_bytes("").mended(stop_bytes("").own[0].data)
-    shared.port._do([Write(1, b"PR P\r")])  # the loop has not heard of the key yet
+    shared.port._do([ClientWrite(1, b"PR P\r")])  # the loop has not heard of the key yet
     shared.port.stop()
     assert shared.events()[-2:] == ["unsent", "stop"] and shared.said[-2].detail.startswith("5 bytes")
 
@@ -359,21 +359,21 @@ async def test_a_stop_while_the_port_is_lost_is_its_first_bytes_after_the_return
 async def test_four_clients_that_flood_it_with_requests_do_not_come_before_anothers_stop(
     shared: Shared, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    worked, answers = list[Request](), Client.answers
+    worked, answers = list[ClientRequest](), ClientStream.answers
 
-    def count(client: Client, request: Request) -> bool:
+    def count(client: ClientStream, request: ClientRequest) -> bool:
         worked.append(request)
         return answers(client, request)
 
-    at_stop, receive = list[int](), Client.receive
+    at_stop, receive = list[int](), ClientStream.receive
 
-    def note(client: Client, data: bytes) -> list[Input]:
+    def note(client: ClientStream, data: bytes) -> list[Input]:
         if data == b"\x1b":
             at_stop.append(len(worked))
         return receive(client, data)
 
-    monkeypatch.setattr(Client, "answers", count)
-    monkeypatch.setattr(Client, "receive", note)
+    monkeypatch.setattr(ClientStream, "answers", count)
+    monkeypatch.setattr(ClientStream, "receive", note)
     flooding = [await shared.client() for _ in range(4)]
     _, bob = await shared.client()
     await until(lambda: shared.events().count("connected") == 5)
@@ -383,7 +383,7 @@ async def test_four_clients_that_flood_it_with_requests_do_not_come_before_anoth
     bob.write(b"\x1b")
     before = len(worked)
     await shared.line.got(b"\x1b")
-    assert at_stop[0] - before <= 4 * 2 * TURN * 3 < 4 * 900 - before  # three looks at the sockets, at most
+    assert at_stop[0] - before <= 4 * 2 * WRITES_A_TURN * 3 < 4 * 900 - before  # three looks at the sockets, at most
     await until(lambda: len(worked) == 4 * 900)
 
 

@@ -113,7 +113,7 @@ def test_a_client_that_comes_with_a_stop_while_the_port_is_away_is_told_that_it_
     port.send(4, telnet.option(telnet.WILL, OPTION) + b"\x1b")
     reason = f"lost: gone; {NOT_REACHED}: {OWED}"
     assert port.sent[4].endswith(message(Setting.SIGNATURE + REPLY, reason.encode()))
-    assert len(reason) < telnet.LONGEST - 2  # a longer one is cut
+    assert len(reason) < telnet.LONGEST_SUBNEGOTIATION - 2  # a longer one is cut
 
 
 def test_a_stop_just_before_the_loss_may_not_have_left_and_is_owed_and_its_client_reads_that(port: Port) -> None:

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.features.sharing.writer_turns import TURN, WAITING, Action, Close, Purge, Send, Set, Stop, Write
+from multidrop.features.sharing.writer_turns import (
+    WAITING,
+    WRITES_A_TURN,
+    Action,
+    ClientWrite,
+    Close,
+    Purge,
+    Send,
+    Set,
+    Stop,
+)
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
 from tests.support.shared_exchange import ADA, BOB, EVE, HELLO, Port
@@ -206,16 +216,18 @@ def test_a_stop_is_written_before_any_request_of_its_read(where: int) -> None:
     port = agreed(Port(), ADA)
     actions = port.exchange.receive(ADA, flood(where) + b"\x1b" + flood(600 - where), 0.0)
     [stop] = [at for at, each in enumerate(actions) if isinstance(each, Stop)]
-    assert replies(actions[:stop]) == 0 and replies(actions) <= TURN
+    assert replies(actions[:stop]) == 0 and replies(actions) <= WRITES_A_TURN
 
 
 def test_a_few_requests_of_each_client_are_worked_off_before_the_others_are_read() -> None:
     port = agreed(Port(), ADA, BOB, EVE)
     for client in (ADA, BOB, EVE):
-        assert replies(port.exchange.receive(client, flood(500), 0.0)) <= TURN
+        assert replies(port.exchange.receive(client, flood(500), 0.0)) <= WRITES_A_TURN
     assert port.exchange.deadline == 0.0
     worked = [replies(port.exchange.advance(0.0)) for _ in range(100)]
-    assert max(worked) <= 3 * TURN and sum(worked) == 3 * (500 - TURN) and port.exchange.deadline != 0.0
+    assert (
+        max(worked) <= 3 * WRITES_A_TURN and sum(worked) == 3 * (500 - WRITES_A_TURN) and port.exchange.deadline != 0.0
+    )
 
 
 def test_escape_within_a_request_is_no_stop() -> None:
@@ -262,7 +274,7 @@ def test_a_client_that_never_waits_for_replies_is_dropped_and_its_stop_still_pas
         actions = port.exchange.receive(ADA, flood(400), 0.0)
     assert len(port.exchange.clients[ADA].waiting) <= WAITING + 400
     later = port.exchange.receive(ADA, flood(400) + b"\x1bMR 1\r", 0.0)
-    assert isinstance(later[0], Stop) and not [each for each in later if isinstance(each, Write)]
+    assert isinstance(later[0], Stop) and not [each for each in later if isinstance(each, ClientWrite)]
 
 
 def test_a_purge_and_a_stop_in_one_read_do_not_drop_the_stop() -> None:

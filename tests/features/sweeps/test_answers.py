@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from multidrop.features.sweeps import answers
-from multidrop.features.sweeps.answers import Answer, Tally
-from multidrop.features.sweeps.trial import HELD, MARGIN, Result
+from multidrop.features.sweeps.answers import CaseTally, SweepAnswer
+from multidrop.features.sweeps.trial import ALL_HELD, MARGIN, TrialResult
 from tests.support.cases import for_each
 
 Fails = Callable[..., int | None]
@@ -27,19 +27,19 @@ def answer(
     search: str = "",
     draws: int | None = None,
     order: int = 1,
-) -> Answer:
+) -> SweepAnswer:
     cases = list(product(*keys.values()))
     results = {}
     for number, values in list(enumerate(cases))[::order]:
         failed = fails(*values)
-        results[number] = Result(number, HELD if failed is None else failed, "", cells(*values))
+        results[number] = TrialResult(number, ALL_HELD if failed is None else failed, "", cells(*values))
     columns = [f"{MARGIN}{EXPECTS[0]}", "moves", f"{MARGIN}{EXPECTS[1]}"]
     parts = [SimpleNamespace(text=name, part=name) for name in keys]
     job = SimpleNamespace(keys=parts, expects=EXPECTS)
     plan: Any = SimpleNamespace(job=job, values_of=lambda number: cases[number], asked=SimpleNamespace(draws=draws))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(answers, "bench", lambda job: SimpleNamespace(columns=[c for c in columns if c != "moves"]))
-        return Answer(plan, results, search)
+        return SweepAnswer(plan, results, search)
 
 
 def where(holds: Callable[..., bool]) -> Fails:
@@ -77,7 +77,7 @@ def test_what_failed_before_a_condition_decided_it_and_leaves_no_margin() -> Non
     [(0, 0, 0), (3, 3, 100), (3, 0, 0), (1000, 1, 1), (1000, 999, 99), (3, 1, 33), (3, 2, 67), (200, 1, 1)],
 )
 def test_only_all_is_100_per_cent_and_only_none_is_0(cases: int, passed: int, percent: int) -> None:
-    assert Tally(cases, passed).percent == percent
+    assert CaseTally(cases, passed).percent == percent
 
 
 def test_a_key_of_many_values_has_stretches_of_them() -> None:

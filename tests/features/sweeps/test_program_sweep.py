@@ -141,7 +141,7 @@ def test_junit_has_a_case_for_each_and_the_command(sweep, tmp_path: Path) -> Non
 def test_interrupted_it_keeps_what_is_done(sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tried = trial.Bench.tried
 
-    def interrupted(self: trial.Bench, case: trial.Case) -> trial.Result:
+    def interrupted(self: trial.Bench, case: trial.Case) -> trial.TrialResult:
         if case[0] == 4:
             signal.raise_signal(signal.SIGTERM)
         return tried(self, case)

@@ -20,7 +20,7 @@ from multidrop.base import atomic
 from multidrop.base.errors import Diagnostic
 from multidrop.features.sweeps import plan, results, trial
 from multidrop.features.sweeps.answers import _words
-from multidrop.features.sweeps.trial import Result
+from multidrop.features.sweeps.trial import TrialResult
 from tests.support.cell_session import bus, drive
 from tests.support.front_door import Command, Done
 
@@ -47,7 +47,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     found: list[int] = []
     tried = trial.Bench.tried
 
-    def noted(self: trial.Bench, case: trial.Case) -> Result:
+    def noted(self: trial.Bench, case: trial.Case) -> TrialResult:
         found.append(case[0])
         return tried(self, case)
 
@@ -141,14 +141,14 @@ def test_a_killed_sweep_goes_on_where_it_was(
     whole = (tmp_path / "whole.csv").read_bytes()
     noted = trial.Bench.tried
 
-    def killed(self: trial.Bench, case: trial.Case) -> Result:
+    def killed(self: trial.Bench, case: trial.Case) -> TrialResult:
         if case[0] == 5:
             raise SystemExit(137)
         return noted(self, case)
 
     with monkeypatch.context() as context:
         context.setattr(trial.Bench, "tried", killed)
-        context.setattr(results, "PERIOD", 0.0)
+        context.setattr(results, "LEAST_WRITE_PERIOD", 0.0)
         context.setattr(results, "SHARE", 0)
         assert sweep(*GRID, "--resume", "part.csv").returncode == 137
     assert [each["case"] for each in rows(tmp_path / "part.csv")] == ["1", "2", "3", "4"]
@@ -265,11 +265,13 @@ def test_an_output_that_cannot_be_made_leaves_no_other_and_nothing_runs(
     assert ran == [] and {each.name for each in tmp_path.iterdir() if each.is_file()} == {"go.mxt", "cell.toml"}
 
 
-def table_of(folder: Path) -> tuple[plan.Plan, bytes]:
+def table_of(folder: Path) -> tuple[plan.SweepPlan, bytes]:
     """A plan, and the bytes of its table."""
     (folder / "go.mxt").write_text(GO)
-    made = plan.make(plan.Asked(str(folder / "go.mxt"), vary=[("load", "0..0.3:0.1")], expect=["virtual_s < 2"]))
-    found = results.Table(made, str(folder / "all.csv"))
+    made = plan.make(
+        plan.SweepArguments(str(folder / "go.mxt"), vary=[("load", "0..0.3:0.1")], expect=["virtual_s < 2"])
+    )
+    found = results.ResultTable(made, str(folder / "all.csv"))
     for number in range(1, 5):
         found.take(trial.bench(made.job).tried(made.case(number)))
     found.save(now=True)
@@ -277,7 +279,7 @@ def table_of(folder: Path) -> tuple[plan.Plan, bytes]:
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, plan.Plan, bytes]:
+def kept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, plan.SweepPlan, bytes]:
     folder = tmp_path_factory.mktemp("table")
     return folder, *table_of(folder)
 
@@ -290,11 +292,11 @@ def test_a_damaged_table_is_read_or_refused_and_never_changed(kept: Any, data: s
     damaged = whole[:begin] + data.draw(st.binary(max_size=12)) + whole[end:]
     (folder / "bad.csv").write_bytes(damaged)
     try:
-        known = results.Table(made, resume=str(folder / "bad.csv")).known
+        known = results.ResultTable(made, resume=str(folder / "bad.csv")).known
     except Diagnostic as problem:
         assert "\n" not in str(problem)
     else:
-        assert set(known) <= {1, 2, 3, 4} and all(isinstance(each, Result) for each in known.values())
+        assert set(known) <= {1, 2, 3, 4} and all(isinstance(each, TrialResult) for each in known.values())
     assert (folder / "bad.csv").read_bytes() == damaged
     assert not [each for each in folder.iterdir() if each.name.endswith(".tmp")]
 
@@ -377,7 +379,7 @@ def test_nothing_else_writes_the_files(sweep: Sweep, tmp_path: Path, monkeypatch
         replace(new, old)
 
     monkeypatch.setattr(atomic, "_replace", watched)
-    monkeypatch.setattr(results, "PERIOD", 0.0)
+    monkeypatch.setattr(results, "LEAST_WRITE_PERIOD", 0.0)
     monkeypatch.setattr(results, "SHARE", 0)
     sweep(*GRID, "--csv", "all.csv")
     assert seen == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10]
@@ -399,18 +401,18 @@ def test_the_motor_is_varied_and_a_margin_leaves_out_what_an_error_ended(sweep: 
 @given(why=st.text(alphabet="=+-@'\t1x ,\"", max_size=8))
 def test_no_cell_of_a_table_is_a_formula_and_each_is_read_again(kept: Any, why: str) -> None:
     folder, made, _ = kept
-    table = results.Table(made)
+    table = results.ResultTable(made)
     cells = (why,) * (len(table._columns[table._kept]))
     margins = [name.startswith(results.MARGIN) for name in table._columns[table._kept]]
     cells = tuple("" if margin else cell for cell, margin in zip(cells, margins, strict=True))
     path = folder / "formula.csv"
     path.unlink(missing_ok=True)
-    table = results.Table(made, str(path))
-    table.take(Result(1, results.HELD, why, cells))
+    table = results.ResultTable(made, str(path))
+    table.take(TrialResult(1, results.ALL_HELD, why, cells))
     table.save(now=True)
     for row in csv.reader(path.read_text().splitlines()):
         assert not [each for each in row if each[:1] in "=+-@" and each[:1] and not _is_number(each)], row
-    assert results.Table(made, resume=str(path)).known[1] == Result(1, results.HELD, why, cells)
+    assert results.ResultTable(made, resume=str(path)).known[1] == TrialResult(1, results.ALL_HELD, why, cells)
 
 
 def _is_number(text: str) -> bool:

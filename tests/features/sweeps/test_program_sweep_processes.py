@@ -133,7 +133,7 @@ def test_a_cluster_runs_the_same_cases(folder: Path, multidrop: Command, monkeyp
     here = multidrop("program", "sweep", "go.mxt", *WALLS, "--json", "--jobs", "1")
     assert (there.returncode, there.stderr) == (1, "")
     assert there.stdout.splitlines()[:-1] == here.stdout.splitlines()[:-1] and there.stdout.count("\n") == 121
-    monkeypatch.setattr(workers, "PATIENCE", 0.2)
+    monkeypatch.setattr(workers, "SCHEDULER_TIMEOUT", 0.2)
     lost = multidrop("program", "sweep", "go.mxt", *WALLS, "--yes", "--cluster", address)
     assert lost.returncode == 3 and lost.stdout == "" and "no scheduler replies" in lost.stderr
     assert lost.stderr.count("\n") == 2  # and the one about the seed
@@ -164,9 +164,9 @@ def test_a_cluster_of_which_a_part_hangs_is_lost_after_a_time_that_is_named(
 ) -> None:
     """What was done before is in the table, and a sweep of this machine goes on with it."""
     pytest.importorskip("distributed", reason="the extra cluster is not installed")
-    monkeypatch.setattr(workers, "SILENT", 2.0)
-    monkeypatch.setattr(workers, "LOOK", 0.2)
-    monkeypatch.setattr(workers, "PATIENCE", 1.0)
+    monkeypatch.setattr(workers, "WORKER_TIMEOUT", 2.0)
+    monkeypatch.setattr(workers, "CHECK_PERIOD", 0.2)
+    monkeypatch.setattr(workers, "SCHEDULER_TIMEOUT", 1.0)
     wait = workers._Work._wait
     stopped: list[str] = []
 
@@ -202,7 +202,7 @@ def test_an_address_is_asked_for_once_at_a_terminal_and_a_yes_is_kept(
         return answer
 
     monkeypatch.setattr(terminal_input, "ask_outside_a_session", ask)
-    monkeypatch.setattr(workers, "PATIENCE", 0.2)
+    monkeypatch.setattr(workers, "SCHEDULER_TIMEOUT", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as scheduler:
         scheduler.setblocking(False)
         address = f"tcp://127.0.0.1:{scheduler.getsockname()[1]}"

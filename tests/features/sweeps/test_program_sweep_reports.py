@@ -19,7 +19,7 @@ from multidrop.__main__ import main
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.features.sweeps import command as command
 from multidrop.features.sweeps import trial, workers
-from multidrop.features.sweeps.trial import Case, Job, Result
+from multidrop.features.sweeps.trial import Case, TrialJob, TrialResult
 from multidrop.shell import configuration
 from multidrop.shell.prompt import terminal_input
 from tests.support.cases import for_each
@@ -76,7 +76,7 @@ class Clock:
         monkeypatch.setattr(command, "StatusLine", Shown)
         tried = trial.Bench.tried
 
-        def timed(bench: trial.Bench, case: Case) -> Result:
+        def timed(bench: trial.Bench, case: Case) -> TrialResult:
             self.now += step
             self.tries.append(case[0])
             return tried(bench, case)
@@ -151,7 +151,7 @@ def test_after_an_early_end_they_are_looked_for_during_one_second(
     clock = Clock(monkeypatch, 0.75)
     timed = trial.Bench.tried
 
-    def interrupted(bench: trial.Bench, case: Case) -> Result:
+    def interrupted(bench: trial.Bench, case: Case) -> TrialResult:
         if case[0] == 5:
             signal.raise_signal(signal.SIGINT)
         return timed(bench, case)
@@ -165,7 +165,7 @@ def test_after_an_early_end_they_are_looked_for_during_one_second(
 def test_a_signal_during_the_search_ends_only_that(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
     tried, tries = trial.Bench.tried, list[int]()
 
-    def interrupted(bench: trial.Bench, case: Case) -> Result:
+    def interrupted(bench: trial.Bench, case: Case) -> TrialResult:
         tries.append(case[0])
         if len(tries) == 10:
             signal.raise_signal(signal.SIGTERM)
@@ -187,12 +187,12 @@ def test_without_a_number_of_jobs_there_are_as_many_as_cores(sweep: Sweep, monke
     seen: list[tuple[int, int]] = []
 
     def results(
-        job: Job, cases: Iterator[Case], count: int, jobs: int, *_: object, say: Callable[[str], None]
-    ) -> Iterator[list[Result]]:
+        job: TrialJob, cases: Iterator[Case], count: int, jobs: int, *_: object, say: Callable[[str], None]
+    ) -> Iterator[list[TrialResult]]:
         seen.append((count, jobs))
         say("the workers cannot start")
         say("the workers cannot start")
-        yield [Result(number) for number, _ in cases]
+        yield [TrialResult(number) for number, _ in cases]
 
     monkeypatch.setattr(workers, "results", results)
     monkeypatch.setattr(workers, "cores", lambda: 7)
@@ -207,7 +207,9 @@ def cluster(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """A cluster in this process, which fails after some cases if it has a `failure`."""
     found = SimpleNamespace(failure=None, after=3, addresses=[])
 
-    def results(job: Job, rounds: Any, address: str, _: object, agree: Callable[[], None]) -> Iterator[list[Result]]:
+    def results(
+        job: TrialJob, rounds: Any, address: str, _: object, agree: Callable[[], None]
+    ) -> Iterator[list[TrialResult]]:
         agree()
         found.addresses.append(address)
         ready = trial.bench(job)

@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.features.sweeps import trial, workers
-from multidrop.features.sweeps.trial import Case, Job, Result
+from multidrop.features.sweeps.trial import Case, TrialJob, TrialResult
 from multidrop.shell.signals import Interruption
 
 comm = pytest.importorskip("distributed.comm", reason="the extra cluster is not installed")
@@ -32,25 +32,25 @@ def dying(*_: object) -> Iterator[Dying]:
 def test_a_scheduler_that_ends_in_the_middle_of_a_question_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is done was yielded before, and is reported."""
 
-    def run(job: Job, cases: list[Case]) -> list[Result]:
-        return [Result(number) for number, _ in cases]
+    def run(job: TrialJob, cases: list[Case]) -> list[TrialResult]:
+        return [TrialResult(number) for number, _ in cases]
 
     monkeypatch.setattr(workers, "_client", dying)
     monkeypatch.setattr(workers, "_check_workers", lambda *_: None)
     monkeypatch.setattr(trial, "chunk", run)
     cases: Iterator[Case] = iter([(number, ()) for number in (1, 2, 3)])
-    found: list[Result] = []
-    job = Job("", "", "", "", "", (), ())
+    found: list[TrialResult] = []
+    job = TrialJob("", "", "", "", "", (), ())
     with Interruption() as interruption, pytest.raises(TransportLost, match=r"^tcp://h:1: the scheduler was lost$"):
         for chunk in workers.cluster_results(job, [cases], "tcp://h:1", interruption, lambda: None):
             found += chunk
-    assert found == [Result(1)]
+    assert found == [TrialResult(1)]
 
 
 def test_an_address_with_a_password_is_refused_before_it_is_shown_or_agreed_to() -> None:
     asked: list[str] = []
     with Interruption() as interruption, pytest.raises(Diagnostic) as refused:
-        job = Job("", "", "", "", "", (), ())
+        job = TrialJob("", "", "", "", "", (), ())
         next(workers.cluster_results(job, [], "tcp://me:pw@h:1", interruption, lambda: asked.append("asked")))
     assert "pw" not in str(refused.value) and not asked
 
@@ -63,7 +63,7 @@ class Silent:
         self.loop, self.status, self.scheduler = None, "running", SimpleNamespace(identity=None)
         self.cancelled = 0
 
-    def map(self, _: object, jobs: list[Job], *__: object, **___: object) -> list[int]:
+    def map(self, _: object, jobs: list[TrialJob], *__: object, **___: object) -> list[int]:
         return list(range(len(jobs)))
 
     def sync(self, *_: object, callback_timeout: float) -> dict[str, Any]:
@@ -86,9 +86,9 @@ class Silent:
 @pytest.mark.parametrize(
     ("replies", "seconds", "what"),
     [
-        (lambda look: None, workers.SILENT, "no worker gave a sign of life for 30 s"),
-        (lambda look: {}, workers.SILENT, "no worker gave a sign of life for 30 s"),
-        (lambda look: {"a": 5.0, "b": 6.0}, workers.SILENT, "no worker gave a sign of life for 30 s"),
+        (lambda look: None, workers.WORKER_TIMEOUT, "no worker gave a sign of life for 30 s"),
+        (lambda look: {}, workers.WORKER_TIMEOUT, "no worker gave a sign of life for 30 s"),
+        (lambda look: {"a": 5.0, "b": 6.0}, workers.WORKER_TIMEOUT, "no worker gave a sign of life for 30 s"),
         (lambda look: {"a": 5.0, "b": look}, workers.STUCK, "the workers gave no result for 600 s"),
     ],
 )
@@ -111,20 +111,30 @@ def test_a_cluster_that_gives_no_result_is_lost_after_a_time(
     monkeypatch.setattr("distributed.as_completed", client)
     monkeypatch.setattr(workers, "time", SimpleNamespace(monotonic=lambda: client.now))
     with Interruption() as interruption:
-        work = workers._Work(client, Job("", "", "", "", "", (), ()), "tcp://h:1", interruption)
+        work = workers._Work(client, TrialJob("", "", "", "", "", (), ()), "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match=f"^tcp://h:1: {what}$"):
             list(work.results([[(1, ())], [(2, ())]]))
-    assert seconds <= client.now < seconds + 3 * workers.LOOK and client.cancelled == 2
+    assert seconds <= client.now < seconds + 3 * workers.CHECK_PERIOD and client.cancelled == 2
 
 
 @pytest.mark.parametrize(
     "found",
-    [None, [], [1], {}, "x", [Result(2)], [Result(1), Result(3)], [Result(1), Result(2), Result(3)], (Result(1),)],
+    [
+        None,
+        [],
+        [1],
+        {},
+        "x",
+        [TrialResult(2)],
+        [TrialResult(1), TrialResult(3)],
+        [TrialResult(1), TrialResult(2), TrialResult(3)],
+        (TrialResult(1),),
+    ],
 )
 def test_a_reply_that_is_no_result_ends_the_sweep(found: object) -> None:
     future = SimpleNamespace(status="finished", result=lambda timeout: found)
     with Interruption() as interruption:
-        job = Job("", "", "", "", "", (), ())
+        job = TrialJob("", "", "", "", "", (), ())
         work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match="^tcp://h:1: a worker replied with something else than results$"):
             work._result(future, [(1, ()), (2, ())])
@@ -133,7 +143,7 @@ def test_a_reply_that_is_no_result_ends_the_sweep(found: object) -> None:
 def test_an_exception_of_a_worker_is_one_line() -> None:
     future = SimpleNamespace(status="error", exception=lambda timeout: ImportError("no module x"))
     with Interruption() as interruption:
-        job = Job("", "", "", "", "", (), ())
+        job = TrialJob("", "", "", "", "", (), ())
         work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match="^tcp://h:1: a worker failed: ImportError: no module x$"):
             work._result(future, [(1, ())])

@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.features.sweeps.trial import Outcome, parse_condition
+from multidrop.features.sweeps.trial import TrialOutcome, parse_condition
 
-SEEN = Outcome(51198, (86, 81), ("at 51200", "7"), 1.5, "E")
-STAGE = Outcome((100, -200), ("?Moving",), (), 0.25, "until")
+SEEN = TrialOutcome(51198, (86, 81), ("at 51200", "7"), 1.5, "E")
+STAGE = TrialOutcome((100, -200), ("?Moving",), (), 0.25, "until")
 
 
 @pytest.mark.parametrize(

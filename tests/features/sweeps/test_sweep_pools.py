@@ -19,12 +19,12 @@ import pytest
 
 from multidrop.features.sweeps import pools, trial
 from multidrop.features.sweeps.pools import Pools
-from multidrop.features.sweeps.trial import DIED, Case, Job, Result
+from multidrop.features.sweeps.trial import DIED, Case, TrialJob, TrialResult
 from multidrop.shell.signals import FROM_TERMINAL, SIGNALS, Interruption
 from multidrop.shell.streams.stdout import WATCHER
 from tests.support.cases import for_each
 
-JOB = Job("", "", "", "", "", (), ())
+JOB = TrialJob("", "", "", "", "", (), ())
 DEADLY = 5
 """The case that ends the process that runs it."""
 
@@ -118,12 +118,12 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     return Machine(monkeypatch)
 
 
-def whole(job: Job, cases: Sequence[Case]) -> list[Result]:
+def whole(job: TrialJob, cases: Sequence[Case]) -> list[TrialResult]:
     assert job is JOB
-    return [Result(number) for number, _ in cases]
+    return [TrialResult(number) for number, _ in cases]
 
 
-def half(job: Job, cases: Sequence[Case]) -> list[Result]:
+def half(job: TrialJob, cases: Sequence[Case]) -> list[TrialResult]:
     return whole(job, cases)[: max(1, len(cases) // 2)]
 
 
@@ -134,14 +134,14 @@ def chunks(*numbers: int, size: int = 2) -> Iterator[list[Case]]:
 
 def ran(
     todo: Iterator[list[Case]], run: Any = whole, jobs: int = 2, said: list[str] | None = None
-) -> list[list[Result]]:
+) -> list[list[TrialResult]]:
     with Interruption() as interruption:
         return list(Pools(JOB, jobs, interruption, run, (said if said is not None else []).append).results(todo))
 
 
 def test_chunks_run_in_one_pool_and_few_are_submitted_ahead(machine: Machine) -> None:
     found = ran(chunks(*range(10, 60)))
-    assert found == [[Result(n), Result(n + 1)] for n in range(10, 60, 2)]
+    assert found == [[TrialResult(n), TrialResult(n + 1)] for n in range(10, 60, 2)]
     trial_pool, pool = machine.pools
     assert trial_pool.size == 1 and trial_pool.ended == {} and trial_pool.ran == []
     assert (pool.size, pool.ended, len(pool.ran)) == (2, {"cancel_futures": True}, 25)
@@ -163,7 +163,7 @@ def test_after_the_death_of_a_process_its_cases_run_alone_and_the_others_in_a_ne
     results = sorted(each for chunk in found for each in chunk)
     assert [each.number for each in results] == list(range(1, 31))
     assert [each for each in results if not each.ok] == [
-        Result(DEADLY, DIED, "the process that ran it died: killed, or out of memory")
+        TrialResult(DEADLY, DIED, "the process that ran it died: killed, or out of memory")
     ]
     first, *alone, last = machine.pools[1:]
     assert first.ran == [(1, 2), (3, 4)] and first.size == 2
@@ -185,7 +185,7 @@ def test_where_no_pool_can_be_made_this_process_runs_all_and_says_why(
     machine: Machine, problem: Any, words: Any
 ) -> None:
     machine.unusable, said = problem, list[str]()
-    assert ran(chunks(4, 5, 6), said=said) == [[Result(4)], [Result(5)], [Result(6)]]
+    assert ran(chunks(4, 5, 6), said=said) == [[TrialResult(4)], [TrialResult(5)], [TrialResult(6)]]
     assert said == [f"no other process can be started ({words}), so all cases run in this one, which takes longer"]
 
 
@@ -198,20 +198,20 @@ def test_where_no_process_begins_this_one_runs_what_was_to_run_there(
 ) -> None:
     machine.refusal, said = problem, list[str]()
     machine.pools.clear()
-    assert ran(chunks(*range(4, 11)), said=said) == [[Result(n)] for n in range(4, 11)]
+    assert ran(chunks(*range(4, 11)), said=said) == [[TrialResult(n)] for n in range(4, 11)]
     assert said == [f"no other process can be started ({words}), so all cases run in this one, which takes longer"]
     assert [each.size for each in machine.pools] == [1, 2, 1]
 
 
 def test_a_signal_ends_the_processes_that_were_begun_and_keeps_what_is_done(machine: Machine) -> None:
     earlier = machine.children[0]
-    kept: list[list[Result]] = []
+    kept: list[list[TrialResult]] = []
     with Interruption() as interruption, pytest.raises(KeyboardInterrupt):
         for found in Pools(JOB, 1, interruption, whole).results(chunks(*range(10, 30))):
             kept.append(found)
             if len(kept) == 3:
                 signal.raise_signal(signal.SIGINT)
-    assert kept == [[Result(n), Result(n + 1)] for n in (10, 12, 14)]
+    assert kept == [[TrialResult(n), TrialResult(n + 1)] for n in (10, 12, 14)]
     assert not earlier.terminated and len(machine.children) > 3
     assert all(each.terminated for each in machine.children[1:])
     assert machine.pools[-1].ended == {"cancel_futures": True}
@@ -226,17 +226,17 @@ def test_a_signal_during_a_wait_keeps_the_results_that_are_there(
         raise AssertionError("it goes on")
 
     monkeypatch.setattr(pools, "wait", interrupted)
-    kept: list[list[Result]] = []
+    kept: list[list[TrialResult]] = []
     with Interruption() as interruption, pytest.raises(KeyboardInterrupt):
         for found in Pools(JOB, 2, interruption, whole).results(chunks(*range(10, 30))):
             kept.append(found)
-    assert kept == [[Result(10), Result(11)]]
+    assert kept == [[TrialResult(10), TrialResult(11)]]
 
 
 def test_a_case_in_this_process_is_interrupted(machine: Machine) -> None:
     machine.unusable = OSError(38, "Function not implemented")
 
-    def told(job: Job, cases: Sequence[Case]) -> list[Result]:
+    def told(job: TrialJob, cases: Sequence[Case]) -> list[TrialResult]:
         signal.raise_signal(signal.SIGINT)
         return whole(job, cases)
 

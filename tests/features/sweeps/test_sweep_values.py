@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.features.sweeps.failures import RUNS, shrunk
-from multidrop.features.sweeps.trial import HELD, REFUSED, Case, Result
+from multidrop.features.sweeps.trial import ALL_HELD, REFUSED, Case, TrialResult
 from multidrop.features.sweeps.variation import parse_key, parse_values, simpler, spelled
 
 
@@ -163,13 +163,13 @@ LOAD, WALL, SPEED = parse_values("0..0.9:0.1"), parse_values("10000..90000:10000
 OWN = [None, None, 20000]
 
 
-def failing(when: Callable[..., bool], runs: list[Case] | None = None) -> Callable[[Case], Result]:
+def failing(when: Callable[..., bool], runs: list[Case] | None = None) -> Callable[[Case], TrialResult]:
     """A run of a case in which the first condition fails `when` it says so of the values."""
 
-    def run(case: Case) -> Result:
+    def run(case: Case) -> TrialResult:
         if runs is not None:
             runs.append(case)
-        return Result(case[0], 0 if when(*case[1]) else HELD)
+        return TrialResult(case[0], 0 if when(*case[1]) else ALL_HELD)
 
     return run
 
@@ -191,8 +191,8 @@ def test_the_simplest_world_is_found(when, world) -> None:
 
 
 def test_a_world_that_fails_in_another_way_is_not_taken() -> None:
-    def run(case: Case) -> Result:
-        return Result(case[0], 1 if case[1][0] is None else REFUSED if case[1][0] < 0.3 else 0)
+    def run(case: Case) -> TrialResult:
+        return TrialResult(case[0], 1 if case[1][0] is None else REFUSED if case[1][0] < 0.3 else 0)
 
     assert shrunk((1, (0.9,)), 0, [LOAD], [None], run) == (0.3,)
 

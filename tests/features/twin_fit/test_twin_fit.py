@@ -14,16 +14,16 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError
 from multidrop.features.twin_fit import command
-from multidrop.features.twin_fit.estimate import FRICTION, INERTIA, LOAD, MARGIN, Evidence, Point, estimates
+from multidrop.features.twin_fit.estimate import FRICTION, INERTIA, LOAD, MARGIN, AxisEvidence, LagPoint, estimates
 from multidrop.features.twin_fit.work import _keep, fit
 from multidrop.shell.batch import runner
-from multidrop.shell.log.files import Entry, line_of
+from multidrop.shell.log.files import LogEntry, line_of
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.streams import stdout
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.family import Effort
-from multidrop.simulator.kinematics import Pace, move
+from multidrop.simulator.kinematics import MotionPace, move
 from multidrop.simulator.torque import MOTORS, Torque
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.twin_cell import run
@@ -35,7 +35,7 @@ GRAIN = 0.05
 """Full steps in a count, of 4000 a turn."""
 
 
-def measured(hidden: WorldSpec, states: Sequence[tuple[float, float, float]], noise: float, seed: int) -> Evidence:
+def measured(hidden: WorldSpec, states: Sequence[tuple[float, float, float]], noise: float, seed: int) -> AxisEvidence:
     """Lags as a drive of 90 % current measures them: in whole counts from a fraction of one. `states`: speed,
     acceleration, direction; `noise`: counts."""
     rng, torque = Random(seed), Torque(hidden)
@@ -44,9 +44,9 @@ def measured(hidden: WorldSpec, states: Sequence[tuple[float, float, float]], no
     for speed, rate, direction in states:
         lag = asin(torque.needed(speed, rate) / (0.9 * torque.available(speed))) * 2 / pi
         counts = round(lag / GRAIN + rng.gauss(0, noise) + direction * origin + rng.uniform(-0.5, 0.5))
-        points.append(Point(counts * GRAIN, speed, rate, 0.9, GRAIN, direction))
-    profile = move(0.0, 0.0, 0.0, 20.0, Pace(vi=0.0, vm=8.0, a=20.0, d=20.0))
-    return Evidence(points, [Effort(profile, 1.0, current=0.9, measured=True)], seen=True)
+        points.append(LagPoint(counts * GRAIN, speed, rate, 0.9, GRAIN, direction))
+    profile = move(0.0, 0.0, 0.0, 20.0, MotionPace(vi=0.0, vm=8.0, a=20.0, d=20.0))
+    return AxisEvidence(points, [Effort(profile, 1.0, current=0.9, measured=True)], seen=True)
 
 
 def ramps(number: int, rate: float = 20.0, directions: Sequence[float] = (1, -1)) -> list[tuple[float, float, float]]:
@@ -250,7 +250,7 @@ def _done(*_: object, **__: object) -> int:
 def test_a_cell_stays_as_it_is_where_the_output_is_lost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "day.log").write_bytes(line_of(Entry(datetime.now().astimezone(), "log", "session of process 1")))
+    (tmp_path / "day.log").write_bytes(line_of(LogEntry(datetime.now().astimezone(), "log", "session of process 1")))
     monkeypatch.setattr(runner, "run", _done)
     monkeypatch.setattr(stdout, "dropped", ["the output cannot be written: No space left on device"])
     assert command.run(str(tmp_path / "day.log"), "sim:cell.toml", False) == 0

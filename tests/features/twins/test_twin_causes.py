@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.comparing.differences import LASTING, LIMIT, Comparison, Pair, Verdict, causes
+from multidrop.shell.comparing.differences import DIFFERENCE_LIMIT, LASTING, AxisComparison, Pair, Verdict, causes
 
 STEP = 0.1
 Motion = Callable[[float], tuple[float, float]]
@@ -83,14 +83,14 @@ def test_a_limit_that_is_lit_and_a_doubtful_line_come_first() -> None:
     assert causes(found, "MR 5")[:2] == ("it is not known whether 'MR 5' was executed", "stall")
 
 
-def verdicts(comparison: Comparison, found: list[Pair]) -> Iterator[tuple[float, Verdict]]:
+def verdicts(comparison: AxisComparison, found: list[Pair]) -> Iterator[tuple[float, Verdict]]:
     for pair in found:
-        if (verdict := comparison.take(pair, LIMIT)) is not None:
+        if (verdict := comparison.take(pair, DIFFERENCE_LIMIT)) is not None:
             yield pair.at, verdict
 
 
 def test_a_difference_is_said_once_and_its_end_once() -> None:
-    comparison = Comparison()
+    comparison = AxisComparison()
     apart, together = pairs(standing(60), standing()), pairs(standing(49), standing())
     assert [each for _, each in verdicts(comparison, apart)] == [Verdict.DIVERGED]
     later = [each._replace(at=each.at + 10) for each in together]
@@ -99,7 +99,7 @@ def test_a_difference_is_said_once_and_its_end_once() -> None:
 
 def test_a_single_reading_is_no_difference() -> None:
     found = [each._replace(position=9999) if n == 3 else each for n, each in enumerate(pairs(standing(), standing()))]
-    assert list(verdicts(Comparison(), found)) == []
+    assert list(verdicts(AxisComparison(), found)) == []
 
 
 @given(st.integers(-600_000, 600_000), st.floats(-0.029, 0.029))
@@ -107,7 +107,7 @@ def test_no_move_of_any_velocity_is_a_difference_because_of_a_delay(velocity: in
     found = [
         Pair(n / 10, round(velocity * (n / 10 - late)), velocity, round(velocity * n / 10), velocity) for n in range(9)
     ]
-    assert list(verdicts(Comparison(), found)) == []
+    assert list(verdicts(AxisComparison(), found)) == []
 
 
 @given(st.lists(st.tuples(*[st.integers(-(2**31), 2**31)] * 4), min_size=2, max_size=12))

@@ -17,7 +17,7 @@ from multidrop.features.usb import interface
 from multidrop.features.usb.controllers import (
     RULE,
     UNREAD,
-    Found,
+    FoundController,
     chosen,
     controllers,
     library,
@@ -25,11 +25,11 @@ from multidrop.features.usb.controllers import (
     ports,
     refusal,
 )
-from multidrop.features.usb.interface import IN, OUT, PRODUCT, VENDOR, Control
+from multidrop.features.usb.interface import IN, OUT, PRODUCT, VENDOR, UsbControl
 from multidrop.transports import Unreachable
 from tests.support.cases import for_each
 
-SEVERAL = [Found("2ED00", "1-1"), Found("2ED00", "1-1.4"), Found("2ED07", "2-3")]
+SEVERAL = [FoundController("2ED00", "1-1"), FoundController("2ED00", "1-1.4"), FoundController("2ED07", "2-3")]
 
 
 @for_each(
@@ -67,7 +67,7 @@ def test_where_there_is_none_the_refusal_says_so() -> None:
 
 
 def test_a_number_that_cannot_be_read_names_the_remedy() -> None:
-    found = [Found(UNREAD, "1-1")]
+    found = [FoundController(UNREAD, "1-1")]
     with pytest.raises(Unreachable, match="not there; controllers on USB: usb:unread@1-1; where a number cannot be"):
         chosen(found, "2ED00")
     assert chosen(found, "unread@1-1") is chosen(found, "") is found[0]
@@ -100,26 +100,28 @@ def test_the_rule_of_udev_is_beside_the_program() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
 def test_the_holder_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(here, "holder", lambda path: f"minicom ({path})")
-    assert refusal(-6, Found("2ED00", "1-1", "/dev/bus/usb/001/002")) == "minicom (/dev/bus/usb/001/002) has it"
+    assert (
+        refusal(-6, FoundController("2ED00", "1-1", "/dev/bus/usb/001/002")) == "minicom (/dev/bus/usb/001/002) has it"
+    )
 
 
 def test_the_numbers_are_those_of_the_makers_driver_and_the_ends_those_of_linux() -> None:
     assert (VENDOR, PRODUCT) == (0x1589, 0xA101)
     assert (OUT, IN, interface.PACKET) == (0x02, 0x82, 64)
     assert (interface.REQUEST_TYPE, interface.REQUEST) == (0x40, 0x02)
-    assert {each.name: int(each) for each in Control} == {"FLUSH": 1, "OPEN": 2, "CLOSE": 4}
+    assert {each.name: int(each) for each in UsbControl} == {"FLUSH": 1, "OPEN": 2, "CLOSE": 4}
     assert (interface.CANCELLED, interface.STALLED, interface.GONE, interface.TIMEOUT) == (-104, -32, -19, -110)
     assert (here.STATUS, here.OTHER) == ({-4: -19, -7: -110, -9: -32}, -5)
 
 
 def test_ports_are_listed_with_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(here, "list_controllers", lambda: [SEVERAL[2], Found(UNREAD, "1-1")])
+    monkeypatch.setattr(here, "list_controllers", lambda: [SEVERAL[2], FoundController(UNREAD, "1-1")])
     assert [(each.device, each.description[:20]) for each in ports()] == [
         ("usb:2ED07@2-3", "Performax controller"),
         ("usb:unread@1-1", ("the maker's driver holds it" if sys.platform == "win32" else f"copy {RULE}")[:20]),
     ]
 
-    def missing() -> list[Found]:
+    def missing() -> list[FoundController]:
         raise Unreachable("usb: needs libusb")
 
     monkeypatch.setattr(here, "list_controllers", missing)
@@ -213,7 +215,7 @@ def test_the_number_is_in_the_descriptor_or_asked_for() -> None:
     assert [each.url for each in found] == ["usb:2ED03@1-1", "usb:unread@1-2", "usb:2ED01@2-3.10", "usb:unread@12-0"]
     assert [each.path for each in found][1:3] == ["/dev/bus/usb/001/004", "/dev/bus/usb/002/004"]
     assert found[0].device is asked
-    assert asked.log == [Control.OPEN, Control.FLUSH, b"DN\0", Control.CLOSE, "closed"]
+    assert asked.log == [UsbControl.OPEN, UsbControl.FLUSH, b"DN\0", UsbControl.CLOSE, "closed"]
     assert silent.log == ["closed"]
 
 
@@ -245,7 +247,10 @@ def test_a_machine_is_looked_at_anew_for_its_list_and_may_have_no_usb(monkeypatc
         yield on(Device(1, [1], "2ED01"), Device(1, [2], "2ED02"))
 
     monkeypatch.setattr(here, "library", lambda: SimpleNamespace(USBContext=context, USBError=Fault))
-    listed = [Found("2ED01", "1-1", "/dev/bus/usb/001/004"), Found("2ED02", "1-2", "/dev/bus/usb/001/004")]
+    listed = [
+        FoundController("2ED01", "1-1", "/dev/bus/usb/001/004"),
+        FoundController("2ED02", "1-2", "/dev/bus/usb/001/004"),
+    ]
     assert list_controllers() == listed, "without the library's devices, whose context has ended"
     fails.append(Fault())
     assert list_controllers() == []

@@ -12,7 +12,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.features.usb.exports import attaching
-from multidrop.features.usb.interface import CANCELLED, STALLED, Control
+from multidrop.features.usb.interface import CANCELLED, STALLED, UsbControl
 from multidrop.features.usb.usbip import (
     INTERFACE,
     OPERATION,
@@ -183,7 +183,7 @@ async def test_it_is_one_device_with_the_one_on_the_line_and_hears_its_own_traff
 
 async def test_requests_are_those_of_the_makers_driver_and_others_are_stalled(shop: Shop) -> None:
     client = await shop.attached()
-    for value in Control:
+    for value in UsbControl:
         assert (await client.request(setup(value), 0)).status == 0
     for request in ("4002030000000000", "4003020000000000", "8006000700000000", "c002010000000800"):
         assert (await client.request(bytes.fromhex(request), 0x80)).status == STALLED, request
@@ -207,7 +207,7 @@ async def test_a_reply_that_was_not_read_comes_first_until_a_flush(shop: Shop) -
     client.writer.close()
     again = await shop.attached()  # after a host that died, too
     assert await again.ask("V2=5") == "0"
-    await again.request(setup(Control.FLUSH), 0)
+    await again.request(setup(UsbControl.FLUSH), 0)
     assert await again.ask("V2") == "5"
 
 
@@ -275,7 +275,7 @@ async def test_half_a_message_waits_and_its_end_is_the_end_of_its_client(shop: S
 async def test_an_unplugged_controller_is_gone_for_its_client_and_comes_back(shop: Shop, command: str) -> None:
     client, other = await shop.attached("1-2"), await shop.attached("1-1")
     await client.submit(0x82)
-    assert (await client.request(setup(Control.FLUSH), 0)).status == 0  # both have arrived
+    assert (await client.request(setup(UsbControl.FLUSH), 0)).status == 0  # both have arrived
     shop.floor.command(f"/sim {command}")
     assert await client.ended()
     assert await (await shop.client()).attach("1-2") == 4

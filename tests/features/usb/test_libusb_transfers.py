@@ -168,7 +168,7 @@ class Desk:
         self.carrier.start(lambda *given: self.done.append(given), self.broken.append)
 
 
-END = (interface.REQUEST_TYPE, interface.REQUEST, interface.Control.CLOSE, 0, b"", 100)
+END = (interface.REQUEST_TYPE, interface.REQUEST, interface.UsbControl.CLOSE, 0, b"", 100)
 OTHER = -5
 """The end for an error of libusb that has no number of Linux."""
 ENDS = [(-4, interface.GONE), (-7, interface.TIMEOUT), (-9, interface.STALLED), (-12, OTHER)]
@@ -195,9 +195,9 @@ def test_a_bus_that_cannot_be_read_and_a_controller_that_cannot_be_claimed_are_n
 async def test_each_transfer_has_its_number_and_ends_with_its_status_and_what_came(bus: Bus) -> None:
     desk = Desk()
     carrier = desk.carrier
-    assert [carrier.control(interface.Control.OPEN), carrier.send(b"ID"), carrier.receive()] == [1, 2, 3]
+    assert [carrier.control(interface.UsbControl.OPEN), carrier.send(b"ID"), carrier.receive()] == [1, 2, 3]
     assert [each.set for each in bus.submitted] == [
-        ("control", interface.REQUEST_TYPE, interface.REQUEST, interface.Control.OPEN, 0, b""),
+        ("control", interface.REQUEST_TYPE, interface.REQUEST, interface.UsbControl.OPEN, 0, b""),
         ("bulk", interface.OUT, b"ID"),
         ("bulk", interface.IN, interface.PACKET),
     ]
@@ -228,7 +228,7 @@ async def test_a_transfer_that_fails_has_no_bytes_and_a_halted_endpoint_is_freed
 ) -> None:
     desk = Desk()
     desk.carrier.receive()
-    desk.carrier.control(interface.Control.OPEN)
+    desk.carrier.control(interface.UsbControl.OPEN)
     for each in bus.submitted:
         each.end(status, b"what came")
     await until(lambda: len(desk.done) == 2)
@@ -374,8 +374,8 @@ async def test_a_controller_is_opened_by_its_target_and_given_back(bus: Bus) -> 
     pipe = await open_libusb("00")
     assert pipe.name == "usb:00"
     assert [each[3] if each[0] == "control" else each[1] for each in bus.begun] == [
-        interface.Control.OPEN,
-        interface.Control.FLUSH,
+        interface.UsbControl.OPEN,
+        interface.UsbControl.FLUSH,
         interface.IN,
     ]
     await pipe.close()

@@ -11,8 +11,8 @@ from collections.abc import Callable
 import pytest
 
 from multidrop.base.errors import TransportLost
-from multidrop.features.usb.interface import CANCELLED, GONE, STALLED, Control
-from multidrop.features.usb.pipe import LATE, REPLY, TAKEN, Broken, Done, TransferFailed, UsbPipe, open_usb
+from multidrop.features.usb.interface import CANCELLED, GONE, STALLED, UsbControl
+from multidrop.features.usb.pipe import REPLY, TAKEN, WRITE_TIMEOUT, Broken, Done, TransferFailed, UsbPipe, open_usb
 from multidrop.transports import Undelivered, Unreachable
 from tests.support.cases import for_each
 from tests.support.until import until
@@ -46,7 +46,7 @@ class Played:
         self.open[number] = what
         return number
 
-    def control(self, value: Control) -> int:
+    def control(self, value: UsbControl) -> int:
         number = self._begin(value.name)
         if self.helpful:
             self.loop.call_soon_threadsafe(self.end, value.name)
@@ -178,7 +178,7 @@ async def test_a_stop_leaves_its_own_thread_ahead_of_a_waiting_transfer(carrier:
     await asyncio.sleep(0)
     assert "X1000" not in carrier.open.values() and host.pipe.pending == 0
     carrier.reply("OK")
-    await asyncio.sleep(2 * LATE)
+    await asyncio.sleep(2 * WRITE_TIMEOUT)
     assert carrier.sent == ["X1000", "ABORT"] and host.losses == []
 
 
@@ -235,7 +235,7 @@ async def test_of_a_stop_of_several_commands_all_are_sent_again_where_one_is_not
     carrier.end("V0=1")
     carrier.end("IN", 0, b"OK\0")
     carrier.end("IN", 0, b"OK\0")
-    await asyncio.sleep(2 * LATE)
+    await asyncio.sleep(2 * WRITE_TIMEOUT)
     host.pipe.yielded()
     host.pipe.write(b"PX\r")
     assert carrier.sent[5:] == ["PX"] and host.losses == [] and host.heard == b"OK\rOK\r"
@@ -279,9 +279,9 @@ async def test_a_stop_drops_what_waits_and_the_begin_of_a_command(carrier: Playe
     host.pipe.write(b"PX\r")
     await asyncio.sleep(0)
     assert carrier.sent == ["X1", "FLUSH", "PX"] and "X1" not in carrier.open.values()
-    await asyncio.sleep(0.9 * LATE)
+    await asyncio.sleep(0.9 * WRITE_TIMEOUT)
     carrier.reply("7")
-    await asyncio.sleep(LATE)
+    await asyncio.sleep(WRITE_TIMEOUT)
     assert host.losses == []
 
 
@@ -353,7 +353,7 @@ async def test_a_stop_that_is_taken_at_the_second_time_is_no_loss(carrier: Playe
     await asyncio.sleep(1.5 * TAKEN)
     carrier.reply("OK")
     host.pipe.yielded()
-    await asyncio.sleep(2 * LATE)
+    await asyncio.sleep(2 * WRITE_TIMEOUT)
     assert host.losses == []
     host.pipe.write(b"PX\r")
     assert carrier.sent[-2:] == ["ABORT", "PX"]
@@ -366,7 +366,7 @@ async def test_a_controller_that_takes_nothing_is_lost(carrier: Played, what: st
     host.pipe.write(b"PX\rPY\r")
     if what == "FLUSH":
         carrier.end("PX")
-    await asyncio.sleep(1.1 * LATE + REPLY)
+    await asyncio.sleep(1.1 * WRITE_TIMEOUT + REPLY)
     assert [str(each) for each in host.losses] == ["usb:2ED00@1-1 was lost: the controller takes nothing"]
     assert type(host.losses[0]) is TransportLost and carrier.closed == 1
     assert carrier.halted and host.pipe.pending == 0
@@ -485,7 +485,7 @@ async def test_closing_waits_for_the_commands_that_wait_and_is_no_loss(carrier: 
     assert not host.pipe.preempt(False, lambda dropped: b"ABORT\r")
     carrier.end("PY")
     await closing
-    await asyncio.sleep(2 * LATE)
+    await asyncio.sleep(2 * WRITE_TIMEOUT)
     assert carrier.closed == 1 and carrier.sent == ["PX", "FLUSH", "PY"] and host.losses == []
 
 

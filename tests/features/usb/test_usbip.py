@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.features.usb import usbip
-from multidrop.features.usb.interface import CANCELLED, PRODUCT, VENDOR, Control
+from multidrop.features.usb.interface import CANCELLED, PRODUCT, VENDOR, UsbControl
 from multidrop.features.usb.pipe import Broken, Done
 from multidrop.features.usb.usbip import (
     OPERATION,
@@ -50,7 +50,7 @@ def test_messages_are_those_of_the_kernels_documentation() -> None:
     out = Transfer(SUBMIT, 7, 0x02, length=3, data=b"PX\0").pack(0x00010002)
     assert out == bytes.fromhex("00000001 00000007 00010002 00000000 00000002 00000000 00000003"
                                 "00000000 00000000 00000000 0000000000000000") + b"PX\0"  # fmt: skip
-    flush = Transfer(SUBMIT, 8, setup=setup(Control.FLUSH)).pack(0x00010002)
+    flush = Transfer(SUBMIT, 8, setup=setup(UsbControl.FLUSH)).pack(0x00010002)
     assert flush[40:] == bytes.fromhex("40 02 0100 0000 0000")
     unlink = Transfer(UNLINK, 9, unlinked=7).pack(0x00010002)
     assert unlink[:24] == bytes.fromhex("00000002 00000009 00010002 00000000 00000000 00000007") and len(unlink) == 48
@@ -231,7 +231,7 @@ async def attached(serve: Serve) -> tuple[usbip.UsbipCarrier, Ear, Streams]:
 
 async def test_several_transfers_are_on_their_way_and_end_in_any_order(serve: Serve) -> None:
     carrier, ear, (reader, writer) = await attached(serve)
-    waiting, asked, flushed = carrier.receive(), carrier.send(b"PX\0"), carrier.control(Control.FLUSH)
+    waiting, asked, flushed = carrier.receive(), carrier.send(b"PX\0"), carrier.control(UsbControl.FLUSH)
     received = read(Transfers(answers=False), await reader.readexactly(3 * 48 + 3), 1)
     assert [(each.endpoint, each.length, each.data) for each in received] == [
         (0x82, 64, b""), (0x02, 3, b"PX\0"), (0, 0, b"")]  # fmt: skip
@@ -241,7 +241,7 @@ async def test_several_transfers_are_on_their_way_and_end_in_any_order(serve: Se
     carrier.halt()
     carrier.close()
     [closing] = read(Transfers(answers=False), await reader.readexactly(48))
-    assert closing.setup == setup(Control.CLOSE) and not await reader.read()
+    assert closing.setup == setup(UsbControl.CLOSE) and not await reader.read()
 
 
 @pytest.mark.parametrize("in_time", [True, False])

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from multidrop.features.usb import usbip
-from multidrop.features.usb.interface import CANCELLED, Control
+from multidrop.features.usb.interface import CANCELLED, UsbControl
 from multidrop.features.usb.pipe import explain_usb
 from multidrop.features.usb.usbip import (
     OPERATION,
@@ -282,7 +282,7 @@ class Desk:
 async def test_each_transfer_is_numbered_and_asks_for_what_it_can_take(side: Side) -> None:
     desk = Desk(side)
     carrier = desk.carrier
-    assert [carrier.control(Control.OPEN), carrier.receive(), carrier.send(b"ID\0")] == [1, 2, 3]
+    assert [carrier.control(UsbControl.OPEN), carrier.receive(), carrier.send(b"ID\0")] == [1, 2, 3]
     opened, waiting, command = side.requests()
     assert (opened.endpoint, opened.length, opened.setup) == (0, 0, bytes.fromhex("4002020000000000"))
     assert (waiting.endpoint, waiting.length, waiting.setup) == (0x82, 64, bytes(8))

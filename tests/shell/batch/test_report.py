@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.shell.batch.report import Report
+from multidrop.shell.batch.report import BatchReport
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ from multidrop.shell.batch.report import Report
 def test_a_failed_line_that_is_no_check_is_not_counted_as_one(
     results: list[tuple[bool, bool]], says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report = Report("s.txt")
+    report = BatchReport("s.txt")
     for check, ok in results:
         result: Any = SimpleNamespace(check=check, ok=ok)
         report.executed(result)

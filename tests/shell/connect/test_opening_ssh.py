@@ -13,7 +13,7 @@ import pytest
 from multidrop.base.errors import DriveError
 from multidrop.drives.bus import Bus
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.opening import OpenedBus
 from multidrop.shell.connect.reconnect import LOGIN, LoginAgain
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.events import Notified
@@ -93,9 +93,9 @@ class Shop:
         self.session.questions.agreed = True
         self.session.subscribe(lambda event: self.said.append(event.text) if isinstance(event, Notified) else None)
 
-    async def opener(self, connection: Connection, _: object) -> list[Opened]:
+    async def opener(self, connection: Connection, _: object) -> list[OpenedBus]:
         bus = Bus("pc", self.kind(), baud=connection.baud or 9600, timeout=0.1)
-        return [Opened(bus, connection.hints, limits=LIMITS)]
+        return [OpenedBus(bus, connection.hints, limits=LIMITS)]
 
     @property
     def limits(self) -> int:

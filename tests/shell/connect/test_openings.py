@@ -9,7 +9,7 @@ from multidrop.base.errors import Diagnostic, NoAnswer
 from multidrop.dialects import Hints
 from multidrop.shell import stop_report
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.opening import OpenedBus
 from multidrop.shell.openings import label
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
@@ -37,7 +37,7 @@ class Floor:
         if takes < 0:
             raise Unreachable(f"{name}: no such port")
         bus = self.buses[name] = FakeBus(naming(connection.short), "a")
-        return [Opened(bus, Hints())]
+        return [OpenedBus(bus, Hints())]
 
 
 async def test_the_buses_stand_in_the_order_of_their_urls_and_take_as_long_as_the_slowest(tmp_path):

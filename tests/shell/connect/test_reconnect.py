@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, TransportLost
 from multidrop.drives.events import Sample
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import OnBus
 from multidrop.shell.scripts.executor import play
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
@@ -419,7 +419,7 @@ async def test_a_drive_that_is_restarted_is_said_and_found_as_it_was_saved(
 
 async def test_a_macro_ends_with_the_loss_and_its_drive_is_stopped_on_return(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", party("a", ES=3), party("b", ES=3))) as shop:
-        macro = Macro("go", (Step(0.0, "@a SL 20000"), Step(0.0, "/wait stopped 60")))
+        macro = Macro("go", (MacroStep(0.0, "@a SL 20000"), MacroStep(0.0, "/wait stopped 60")))
         playing = asyncio.create_task(play(shop.session, shop.session.origin, macro, {}))
         await asyncio.sleep(1.0)
         await shop.session.run("@b SL 10000")

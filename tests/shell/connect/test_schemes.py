@@ -39,7 +39,7 @@ async def serve(floor: Any, bus: str, endpoint: Any, stack: Any) -> list[str]:
 
 
 def add(monkeypatch: pytest.MonkeyPatch, *adds: object) -> None:
-    entry = registry.Entry("gateway", "elsewhere", "1", "elsewhere:FEATURE")
+    entry = registry.FeatureEntry("gateway", "elsewhere", "1", "elsewhere:FEATURE")
     monkeypatch.setattr(registry, "_others", {entry.place: (entry, Feature("gateway", "a gateway", adds))})
     monkeypatch.setattr(registry, "_failed", {})
     monkeypatch.setattr(registry, "_untold", [])

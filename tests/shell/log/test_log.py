@@ -16,7 +16,7 @@ from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.configuration import LogSettings, Settings, parse
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from multidrop.shell.log import files, writer
-from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, entry_of, line_of
+from multidrop.shell.log.files import KINDS, TRAFFIC, LogEntry, entry_of, line_of
 from multidrop.shell.log.writer import SessionLog, begin
 from multidrop.shell.threads import BoundedWriter
 
@@ -185,7 +185,7 @@ AT = st.datetimes(timezones=st.just(UTC)) | st.datetimes().map(
 BYTES = st.binary(max_size=30).map(lambda data: data.decode("latin-1"))
 
 
-@given(st.builds(Entry, AT, st.sampled_from(TRAFFIC), BYTES, st.text(max_size=5), poll=st.booleans()))
+@given(st.builds(LogEntry, AT, st.sampled_from(TRAFFIC), BYTES, st.text(max_size=5), poll=st.booleans()))
 def test_any_bytes_are_read_back_as_they_were(entry):
     line = line_of(entry)
     if "***" not in line.decode():
@@ -297,11 +297,11 @@ def test_two_sessions_that_write_one_file_follow_each_others_rotation(tmp_path):
 
 
 def test_a_disk_that_hangs_is_waited_for_once_and_what_has_no_room_is_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "HELD", 100)
-    monkeypatch.setattr(writer, "PATIENCE", 60.0)
+    monkeypatch.setattr(writer, "MOST_HELD_BYTES", 100)
+    monkeypatch.setattr(writer, "WRITE_TIMEOUT", 60.0)
     made = writer.Disk(tmp_path / "a", 10**6, 2, lambda: b"head\n", lambda number: b"%d missing\n" % number)
     made.put(b"first\n")
-    monkeypatch.setattr(writer, "PATIENCE", 0.001)
+    monkeypatch.setattr(writer, "WRITE_TIMEOUT", 0.001)
     works, waits, write, wait = threading.Event(), [], os.write, BoundedWriter.wait
     monkeypatch.setattr(writer.os, "write", lambda *given: works.wait(60) and write(*given))
     monkeypatch.setattr(BoundedWriter, "wait", lambda *given: waits.append(given) or wait(*given))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.shell.log import files, index
-from multidrop.shell.log.files import INDEX, Entry, entry_of, line_of
+from multidrop.shell.log.files import INDEX, LogEntry, entry_of, line_of
 from multidrop.shell.log.index import EntryKey, IndexKeeper, LogIndex, index_of
 from multidrop.shell.log.writer import Disk
 
@@ -25,7 +25,7 @@ def often(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def head() -> bytes:
-    return line_of(Entry(AT, "log", "session of process 1", marks=True))
+    return line_of(LogEntry(AT, "log", "session of process 1", marks=True))
 
 
 def disk(path: Path, size: int = 10**6, parts: int = 3, begin: Callable[[], bytes] = head) -> Disk:
@@ -33,7 +33,7 @@ def disk(path: Path, size: int = 10**6, parts: int = 3, begin: Callable[[], byte
 
 
 def typed(number: int, text: str = "PR P") -> bytes:
-    return line_of(Entry(AT + timedelta(seconds=number), "typed", f"{text} {number}", "press", "a", by="operator"))
+    return line_of(LogEntry(AT + timedelta(seconds=number), "typed", f"{text} {number}", "press", "a", by="operator"))
 
 
 def indexes(path: Path) -> list[tuple[int, LogIndex]]:
@@ -65,7 +65,7 @@ def test_an_index_line_has_its_own_place_and_the_place_of_the_last_entry_of_each
 def test_places_go_on_across_parts(tmp_path: Path) -> None:
     path = tmp_path / "log"
     log = disk(path, 5000, parts=9, begin=iter((head(), *[b""] * 9)).__next__)
-    log.put(line_of(Entry(AT, "typed", "/resume")))
+    log.put(line_of(LogEntry(AT, "typed", "/resume")))
     for number in range(100):
         log.put(typed(number))
     log.close()
@@ -111,7 +111,7 @@ def test_a_clock_that_was_set_back_and_polls_are_noted() -> None:
     made = keeper.take(head())
     for seconds in times:
         at = AT + timedelta(seconds=seconds)
-        made = made or keeper.take(line_of(Entry(at, "sent", "PR P", "press", "a", poll=True)))
+        made = made or keeper.take(line_of(LogEntry(at, "sent", "PR P", "press", "a", poll=True)))
     found = index_of(made)
     assert found is not None and not found.steady and found.polls > 10 and not found.entries
 

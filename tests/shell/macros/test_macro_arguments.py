@@ -9,14 +9,14 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.bus import Bus
-from multidrop.macros import Macro, Step
-from multidrop.shell.channel import Field
+from multidrop.macros import Macro, MacroStep
+from multidrop.shell.channel import AskedValue
 from multidrop.shell.events import Notified
 from multidrop.shell.macro_arguments import settled
 from multidrop.shell.session import Session
 
-TURNS = Macro("turns", (Step(0.0, "MR {far:int=7,1..9}"), Step(0.0, "VM {fast:int}")))
-GANTRY = Macro("home", (Step(0.0, "@gantry:a HM 1"), Step(0.0, "/wait @gantry:a I1=1")), roles=("gantry",))
+TURNS = Macro("turns", (MacroStep(0.0, "MR {far:int=7,1..9}"), MacroStep(0.0, "VM {fast:int}")))
+GANTRY = Macro("home", (MacroStep(0.0, "@gantry:a HM 1"), MacroStep(0.0, "/wait @gantry:a I1=1")), roles=("gantry",))
 
 
 def opened(session: Session, *names: str) -> Session:
@@ -28,10 +28,10 @@ class Person:
     """Fills a form with what it was told, and keeps the fields."""
 
     def __init__(self, session: Session, **answers: str) -> None:
-        self.answers, self.fields = answers, list[Field]()
+        self.answers, self.fields = answers, list[AskedValue]()
         session.front.fill = self.fill
 
-    async def fill(self, title: str, fields: Sequence[Field]) -> Mapping[str, str] | None:
+    async def fill(self, title: str, fields: Sequence[AskedValue]) -> Mapping[str, str] | None:
         self.fields += fields
         return self.answers or None
 

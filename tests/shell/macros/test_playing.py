@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, DriveError
-from multidrop.macros import Macro, MacroStore, Step
+from multidrop.macros import Macro, MacroStep, MacroStore
 from multidrop.shell.events import Progressed
 from multidrop.shell.scripts.executor import run_script
-from multidrop.shell.scripts.model import Ending
+from multidrop.shell.scripts.model import MacroEnding
 from multidrop.shell.scripts.reading import WrongScript, read_macro, read_script, stand_in
 from tests.support.macro_shop import Shop
 
@@ -23,7 +23,12 @@ pytestmark = pytest.mark.virtual
 
 async def test_a_step_starts_its_time_after_the_start_of_the_one_before_or_at_its_end(shop: Shop) -> None:
     zero = shop.session.now()
-    steps = (Step(0.5, "/sleep 0.2"), Step(1.0, "/sleep 3"), Step(2.0, "/sleep 0"), Step(0.5, "/sleep 0.1"))
+    steps = (
+        MacroStep(0.5, "/sleep 0.2"),
+        MacroStep(1.0, "/sleep 3"),
+        MacroStep(2.0, "/sleep 0"),
+        MacroStep(0.5, "/sleep 0.1"),
+    )
     await shop.play(Macro("m", steps))
     assert [round(at - zero, 1) for at, _ in shop.begun()] == [0.5, 1.5, 4.5, 5.0]
     shop.events.clear()
@@ -34,12 +39,14 @@ async def test_a_step_starts_its_time_after_the_start_of_the_one_before_or_at_it
 
 async def test_rounds_are_counted_and_begin_with_the_same_values(shop: Shop) -> None:
     macro = Macro(
-        "m", (Step(0, "/set n {start:int} + 1"), Step(0, "/print {n} {start}")), on_early_end=("/print never",)
+        "m",
+        (MacroStep(0, "/set n {start:int} + 1"), MacroStep(0, "/print {n} {start}")),
+        on_early_end=("/print never",),
     )
     await shop.play(macro, {"start": "4"}, times=3)
     assert shop.printed() == ["5 4"] * 3
     assert [(each.round, each.line.step) for each in shop.results] == [(1, 2), (2, 2), (3, 2)]
-    assert shop.endings == [Ending("m", 3)]
+    assert shop.endings == [MacroEnding("m", 3)]
     assert shop.told()[-1].startswith("macro m: 3 rounds played in ")
 
 
@@ -187,7 +194,7 @@ async def test_a_script_that_calls_a_macro_is_checked_with_its_roles_and_its_end
 def test_a_value_that_is_not_known_yet_has_a_valid_stand_in(kind: str, low: int, width: int) -> None:
     for limits in ("", f",{low}..{low + width}", f",{low}..", f",..{low}"):
         line = f"MR {{n:{kind}{limits if kind in ('int', 'float') else ''}}}"
-        (parameter,) = Macro("m", (Step(0.0, line),)).parameters
+        (parameter,) = Macro("m", (MacroStep(0.0, line),)).parameters
         parameter.take(stand_in(parameter))
 
 
@@ -235,11 +242,11 @@ def test_any_lines_are_checked_without_another_failure_than_a_line_for_a_person(
         def load(self, name: str) -> Macro:
             if name not in ("m", "other"):
                 raise Diagnostic(f"no macro {name}")
-            return Macro(name, (Step(0, "/play m"),) if name == "other" else (Step(0, "PR {n:int,5..7}"),))
+            return Macro(name, (MacroStep(0, "/play m"),) if name == "other" else (MacroStep(0, "PR {n:int,5..7}"),))
 
     with contextlib.suppress(Diagnostic):
         read_macro(
-            Macro("m", tuple(Step(0, line) for line in lines), on_early_end=tuple(lines)), {}, Store(Path("gone"))
+            Macro("m", tuple(MacroStep(0, line) for line in lines), on_early_end=tuple(lines)), {}, Store(Path("gone"))
         )
 
 

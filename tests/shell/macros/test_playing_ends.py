@@ -11,10 +11,10 @@ import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Refused, Stopped, TransportLost
 from multidrop.drives.events import Traffic
-from multidrop.shell.batch.report import Report
+from multidrop.shell.batch.report import BatchReport
 from multidrop.shell.events import Notified, OnBus
 from multidrop.shell.scripts.executor import play, run_script
-from multidrop.shell.scripts.model import Ending
+from multidrop.shell.scripts.model import MacroEnding
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.streams.stdout import report
 from tests.support.automated import automated
@@ -260,7 +260,7 @@ async def test_a_lost_connection_that_it_does_not_use_is_nothing_to_it(shop: Sho
     await asyncio.sleep(0.5)
     shop.world("/sim unplug gantry")
     await playing
-    assert shop.endings == [Ending("m", 1)]
+    assert shop.endings == [MacroEnding("m", 1)]
 
 
 async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(shop: Shop) -> None:
@@ -268,7 +268,7 @@ async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(shop: Shop)
     with pytest.raises(Diagnostic, match="a macro cannot ask"):
         await shop.play(shop.save("m", "@press:a CP"))
     assert not [each for each in shop.events if isinstance(each, OnBus) and isinstance(each.event, Traffic)]
-    assert shop.endings == [Ending("m", 0, "macro m, step 1 of 1")]
+    assert shop.endings == [MacroEnding("m", 0, "macro m, step 1 of 1")]
 
 
 async def test_a_script_that_plays_a_macro_runs_its_on_stop_and_reports_both(tmp_path: Path, shop: Shop) -> None:
@@ -296,7 +296,7 @@ async def test_the_json_of_a_macro_names_macro_step_and_round_and_its_end(
 ) -> None:
     async with Shop(tmp_path) as shop:
         macro = shop.save("m", "@press:a PR 1", '/expect "2" 0', on_early_end=("/print x",))
-        told = Report("macro m", as_json=True, junit=str(tmp_path / "r.xml"))
+        told = BatchReport("macro m", as_json=True, junit=str(tmp_path / "r.xml"))
         with pytest.raises(DriveError):
             await play(
                 shop.session, shop.session.origin, macro, {}, times=None, executed=told.executed, ended=told.ended

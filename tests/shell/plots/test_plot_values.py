@@ -11,7 +11,7 @@ from multidrop.base import registry
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.base.feature import Feature
 from multidrop.drives.events import Valued
-from multidrop.drives.telemetry import Value
+from multidrop.drives.telemetry import DriveValue
 from multidrop.shell.events import OnBus
 from multidrop.shell.hooks import Predicting
 from multidrop.shell.plots.series import parse_series
@@ -136,7 +136,7 @@ async def test_a_variable_that_no_program_declares_is_not_asked_for(tmp_path: Pa
 
 async def test_values_come_at_the_rate_asked_for_behind_what_is_typed(tmp_path: Path) -> None:
     async with two_lines(tmp_path) as cell:
-        reading = cell.session.buses["press"].telemetry.read([Value("a", "VM"), Value("b", "I1")], 0.1)
+        reading = cell.session.buses["press"].telemetry.read([DriveValue("a", "VM"), DriveValue("b", "I1")], 0.1)
         await asyncio.sleep(2)
         await cell.session.run("PR P")
         assert 18 <= sum(each == ("a", "VM", 51200.0) for each in read(cell)) <= 21
@@ -152,7 +152,7 @@ async def test_values_and_positions_share_the_wire(tmp_path: Path) -> None:
     async with two_lines(tmp_path) as cell:
         telemetry = cell.session.buses["press"].telemetry
         telemetry.subscribe(["a"], 0.0)
-        telemetry.read([Value("b", "I1")], 0.0)
+        telemetry.read([DriveValue("b", "I1")], 0.0)
         await asyncio.sleep(4)
         values = len(read(cell)) / 4
         assert values > 15 and telemetry.rate("a") > 10
@@ -169,7 +169,7 @@ async def test_a_value_that_a_drive_has_lost_is_soon_not_asked_for(
     tmp_path: Path, checksum: int, asked: int, says: str
 ) -> None:
     async with CellSession(tmp_path, bus("press", party("a", CK=checksum, EM=0), party("b"))) as cell:
-        cell.session.buses["press"].telemetry.read([Value("a", "QQ"), Value("b", "VM")], 0.1)
+        cell.session.buses["press"].telemetry.read([DriveValue("a", "QQ"), DriveValue("b", "VM")], 0.1)
         await asyncio.sleep(12)
         assert cell.written("press").count(b"PR QQ") == asked and b"ER" not in cell.written("press")
         assert cell.warned() == [says]
@@ -178,7 +178,7 @@ async def test_a_value_that_a_drive_has_lost_is_soon_not_asked_for(
 
 async def test_a_stop_and_program_mode_only_put_a_reading_off(tmp_path: Path) -> None:
     async with two_lines(tmp_path) as cell:
-        cell.session.buses["press"].telemetry.read([Value("a", "VM")], 0.1)
+        cell.session.buses["press"].telemetry.read([DriveValue("a", "VM")], 0.1)
         await asyncio.sleep(0.55)
         cell.session.stop()
         await asyncio.sleep(3)
@@ -199,7 +199,7 @@ async def test_a_stop_and_program_mode_only_put_a_reading_off(tmp_path: Path) ->
 async def test_a_lost_line_ends_no_reading(tmp_path: Path, unplugged: bool) -> None:
     cell = CellSession(tmp_path, bus("press", party("a", VM=51200)), reconnect=True)
     async with cell:
-        cell.session.buses["press"].telemetry.read([Value("a", "VM")], 0.1)
+        cell.session.buses["press"].telemetry.read([DriveValue("a", "VM")], 0.1)
         await asyncio.sleep(1)
         cell.world("unplug press" if unplugged else "power a off")
         await asyncio.sleep(3)
@@ -214,7 +214,7 @@ async def test_a_controller_on_usb(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("line", pmx("00")), usb=True) as cell:
         (address,) = cell.session.buses["line"].drives
         assert parse_series(cell.session, ["DI"]) == (Series("line", address, "DI"),)
-        cell.session.buses["line"].telemetry.read([Value(address, "DI")], 0.1)
+        cell.session.buses["line"].telemetry.read([DriveValue(address, "DI")], 0.1)
         await asyncio.sleep(2)
         assert len(read(cell)) > 10 and len({each[2] for each in read(cell)}) == 1
         assert cell.warned() == []

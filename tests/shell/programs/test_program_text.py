@@ -21,7 +21,7 @@ from multidrop.families.lexium.manual.statements import canonical
 from multidrop.families.lexium.simulator.device import MCodeDevice
 from multidrop.families.pmx.manual.program_file import compiled
 from multidrop.families.pmx.manual.program_file import read as read_script
-from multidrop.shell.programs.program_text import Edit, ProgramGrammar, ProgramText
+from multidrop.shell.programs.program_text import ProgramGrammar, ProgramText, TextEdit
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.world import World
 from tests.support.program_texts import TEXTS
@@ -35,7 +35,7 @@ def text_of(text: str, file: str = "a.mxt", product: str = "LMDCM") -> ProgramTe
     return ProgramText(text, ProgramGrammar(file), product)
 
 
-def edited(text: ProgramText, edits: Sequence[Edit]) -> str:
+def edited(text: ProgramText, edits: Sequence[TextEdit]) -> str:
     lines = text.lines
     for place, new in sorted(edits, reverse=True):
         lines = replaced(lines, [place], new)

@@ -50,7 +50,7 @@ async def test_everything_is_collected_while_all_is_at_rest():
 async def test_a_machine_that_never_rests_is_collected_all_the_same_in_the_end():
     with collected_at_rest(lambda: False):
         lost = await frozen_cycle()
-        await asyncio.sleep(collector.LONGEST)
+        await asyncio.sleep(collector.LONGEST_UNCOLLECTED)
         assert lost() is None
 
 

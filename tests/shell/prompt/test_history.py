@@ -14,7 +14,7 @@ from tests.support.until import PATIENCE
 
 @pytest.fixture
 def three_kept(monkeypatch):
-    monkeypatch.setattr(line_queue, "KEPT", 3)
+    monkeypatch.setattr(line_queue, "MOST_HISTORY_LINES", 3)
 
 
 def test_lines_are_kept_between_runs_oldest_first(tmp_path):

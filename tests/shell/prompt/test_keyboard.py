@@ -10,7 +10,7 @@ import pytest
 
 from multidrop.shell.prompt.keyboard import Keyboard
 from multidrop.shell.prompt.raw_terminal import _waiting as waiting
-from multidrop.shell.prompt.terminal_input import PAUSE, at_keyboard
+from multidrop.shell.prompt.terminal_input import TYPING_PAUSE, at_keyboard
 from tests.support.posix import pty, termios
 from tests.support.until import PATIENCE
 
@@ -139,7 +139,7 @@ async def test_a_question_takes_a_key_that_was_typed_after_it_was_shown(typed, c
             typed.type(b"yy")
             async with asyncio.timeout(PATIENCE):
                 while not asked.done():
-                    await asyncio.sleep(PAUSE * 1.1)  # the pause itself: then a key counts
+                    await asyncio.sleep(TYPING_PAUSE * 1.1)  # the pause itself: then a key counts
                     typed.type(key)
                     await asyncio.sleep(0.01)
             assert asked.result() is expected

@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.base.errors import Refused
 from multidrop.shell.line_syntax import Place, TypedLine
-from multidrop.shell.prompt.line_queue import BURST, SHOWN, LineQueue
+from multidrop.shell.prompt.line_queue import BURST, MOST_SHOWN_UNSENT, LineQueue
 
 pytestmark = pytest.mark.virtual
 
@@ -150,8 +150,8 @@ async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst
 
 async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
     typist = Typist()
-    typist.queue.show_unsent("a stop came", [f"MR {n}" for n in range(SHOWN + 7)] + ["  "])
-    assert len(typist.session.notices) == SHOWN + 1
+    typist.queue.show_unsent("a stop came", [f"MR {n}" for n in range(MOST_SHOWN_UNSENT + 7)] + ["  "])
+    assert len(typist.session.notices) == MOST_SHOWN_UNSENT + 1
     assert typist.session.notices[-1] == "7 more lines were not sent"
 
 

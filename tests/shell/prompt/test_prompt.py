@@ -9,11 +9,11 @@ import pytest
 from prompt_toolkit.output import ColorDepth
 
 from multidrop.base.errors import Diagnostic, Stopped
-from multidrop.macros import Macro, Step
+from multidrop.macros import Macro, MacroStep
 from multidrop.shell.events import Failed, Progressed
 from multidrop.shell.macro_arguments import value_fields
 from multidrop.shell.prompt import prompt
-from multidrop.shell.prompt.terminal_input import PAUSE, at_terminal
+from multidrop.shell.prompt.terminal_input import TYPING_PAUSE, at_terminal
 from multidrop.shell.prompt.view import PlainOutput
 from multidrop.shell.verbs.explaining import overview
 from tests.support.typist import typist as typist_in
@@ -21,8 +21,8 @@ from tests.support.until import until
 
 pytestmark = pytest.mark.virtual
 
-LONG = PAUSE * 2
-FIELDS = value_fields(Macro("m", (Step(0.0, "{turns:int=10,1..100} {mode:choice(a|b)}"),)), {})
+LONG = TYPING_PAUSE * 2
+FIELDS = value_fields(Macro("m", (MacroStep(0.0, "{turns:int=10,1..100} {mode:choice(a|b)}"),)), {})
 TURNS = "macro m: turns, a whole number, 1 to 100 [10]: "
 
 

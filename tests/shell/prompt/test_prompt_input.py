@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from prompt_toolkit.keys import Keys
 
-from multidrop.shell.prompt.keys import BEGIN, END, STALLED, KeyboardInput
+from multidrop.shell.prompt.keys import BEGIN, END, PASTE_TIMEOUT, KeyboardInput
 
 PIECES = ["MR 5", "\r", BEGIN, END, "\x1b[A", "\x1b", "PR P\r", "é"]
 
@@ -93,10 +93,10 @@ async def test_a_paste_without_an_end_is_said_once_and_again_where_a_stop_came_i
     typed.typed = BEGIN + "MR 5"
     while typed.typed:
         made.read_keys()
-    await asyncio.sleep(3 * STALLED)
+    await asyncio.sleep(3 * PASTE_TIMEOUT)
     assert len(told) == 1 and told[0].startswith("a paste has not ended")
     assert made.forget("").endswith("MR 5")
-    await asyncio.sleep(3 * STALLED)
+    await asyncio.sleep(3 * PASTE_TIMEOUT)
     assert told == told[:1] * 2
 
 
@@ -106,7 +106,7 @@ async def test_a_stop_without_a_paste_says_nothing_of_one():
     made = KeyboardInput(typed)
     made.notify = told.append
     made.forget("MR 5")
-    await asyncio.sleep(3 * STALLED)
+    await asyncio.sleep(3 * PASTE_TIMEOUT)
     assert told == []
 
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from multidrop.shell.prompt.terminal_input import PAUSE
+from multidrop.shell.prompt.terminal_input import TYPING_PAUSE
 from tests.support.cases import for_each
 from tests.support.front_door import read_to_end
 from tests.support.processes import Tap
@@ -216,7 +216,7 @@ def test_keys_of_the_same_read_answer_no_question_and_a_later_one_does(shop, pro
     assert shop.velocity() == 0
     prompt.send(f"{line}\r")
     prompt.expect(r"Go on\?")
-    time.sleep(2 * PAUSE)  # the pause itself: from here on a key counts
+    time.sleep(2 * TYPING_PAUSE)  # the pause itself: from here on a key counts
     prompt.send("y")
     until(lambda: shop.velocity() == 50000, "the answer does not count")
     prompt.send("\x18")

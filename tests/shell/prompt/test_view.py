@@ -6,7 +6,17 @@ import asyncio
 
 import pytest
 
-from multidrop.shell.prompt.view import BURST, CHUNK, LONG_PAUSE, MANY, MOST, PATIENCE, PAUSE, LinesAbove, Stream
+from multidrop.shell.prompt.view import (
+    BURST,
+    CHUNK,
+    LONG_PAUSE,
+    MANY,
+    MOST_HELD_LINES,
+    STUCK_AFTER,
+    UPDATE_PAUSE,
+    LinesAbove,
+    PromptStream,
+)
 from multidrop.shell.streams.output_streams import Colour
 
 pytestmark = pytest.mark.virtual
@@ -75,7 +85,7 @@ class Above(LinesAbove):
 async def test_a_flood_is_shown_whole_and_in_chunks():
     above = Above()
     flood = [f"{n:062}" for n in range(5000)]
-    stream = Stream(above, keep=False)
+    stream = PromptStream(above, keep=False)
     stream.write("\n".join(flood[:9]) + "\nhalf")
     stream.lines(flood[9:], spare=True)
     await asyncio.sleep(10)
@@ -92,7 +102,7 @@ async def test_many_lines_have_the_prompt_drawn_less_often():
             above.add(["x"] * lines, keep=False)
             await asyncio.sleep(0.02)
         updates.append(len(above.app.output.times))
-    assert updates[0] == pytest.approx(updates[1] * LONG_PAUSE / PAUSE, rel=0.2)
+    assert updates[0] == pytest.approx(updates[1] * LONG_PAUSE / UPDATE_PAUSE, rel=0.2)
 
 
 async def test_of_more_than_a_burst_the_oldest_are_counted_and_warnings_stay_in_their_place():
@@ -114,13 +124,13 @@ async def test_few_lines_wait_for_a_terminal_that_takes_none():
     above = Above()
     above.writer.behind = True
     above.add(["first"], keep=False)
-    await asyncio.sleep(PATIENCE + 1)
-    above.add(["x"] * (MOST + 5), keep=False)
+    await asyncio.sleep(STUCK_AFTER + 1)
+    above.add(["x"] * (MOST_HELD_LINES + 5), keep=False)
     await asyncio.sleep(100)
     assert above.lines == []
     above.writer.behind = False
     await asyncio.sleep(10)
-    assert above.lines == ["6 lines are missing here: the terminal did not take them", *["x"] * MOST]
+    assert above.lines == ["6 lines are missing here: the terminal did not take them", *["x"] * MOST_HELD_LINES]
 
 
 async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
@@ -137,7 +147,7 @@ async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
 
 async def test_failures_are_coloured_where_the_terminal_shows_colours():
     above = Above()
-    stream = Stream(above, keep=True)
+    stream = PromptStream(above, keep=True)
     assert stream.coloured(Colour.FAILURE) is stream
     above.coloured = True
     stream.coloured(Colour.FAILURE).lines(["a refused 'VM=5'"], spare=False)

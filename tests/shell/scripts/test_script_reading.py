@@ -8,7 +8,7 @@ import pytest
 
 from multidrop.base.comments import uncommented
 from multidrop.base.errors import Diagnostic
-from multidrop.base.files import LARGEST
+from multidrop.base.files import LARGEST_FILE
 from multidrop.shell.prompt.terminal_input import stream_lines
 from multidrop.shell.scripts.reading import read_script
 from tests.support.until import PATIENCE
@@ -99,7 +99,7 @@ async def test_a_cr_ends_lines_of_standard_input_only_where_no_lf_comes(tmp_path
 
 
 async def test_a_line_of_standard_input_has_an_end(tmp_path):
-    (tmp_path / "lines").write_bytes(b"PR P\n" + b"x" * (LARGEST + 100_000))
+    (tmp_path / "lines").write_bytes(b"PR P\n" + b"x" * (LARGEST_FILE + 100_000))
     descriptor = os.open(tmp_path / "lines", os.O_RDONLY)
     with pytest.raises(Diagnostic, match="^standard input:2: a line is larger than 1 MB"):
         _ = [line async for line in stream_lines(descriptor)]

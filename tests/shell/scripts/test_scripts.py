@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Stopped
-from multidrop.macros import Macro, Step
-from multidrop.shell.batch.report import Report
+from multidrop.macros import Macro, MacroStep
+from multidrop.shell.batch.report import BatchReport
 from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
@@ -124,8 +124,8 @@ async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_
 @pytest.mark.parametrize("at", [0.5, 1.5])
 @pytest.mark.parametrize("line", ['@b PR "READY"', "/play ready", "/play print"])
 async def test_an_expectation_does_not_see_what_others_print_meanwhile(line, at, shop):
-    shop.session.macros.save(Macro("ready", (Step(0.0, '@b PR "READY"'),)))
-    shop.session.macros.save(Macro("print", (Step(0.0, "/print READY"),)))
+    shop.session.macros.save(Macro("ready", (MacroStep(0.0, '@b PR "READY"'),)))
+    shop.session.macros.save(Macro("print", (MacroStep(0.0, "/print READY"),)))
     checking = asyncio.create_task(shop.failure('@a PR "going"\n/sleep 1\n/expect "READY" 2', CheckFailed))
     await asyncio.sleep(at)
     await shop.session.run(line)
@@ -169,7 +169,7 @@ async def test_a_called_file_has_the_values_given_to_it_and_those_of_the_command
 
 
 async def test_a_called_macro_is_played(shop):
-    shop.session.macros.save(Macro("say", (Step(0.0, 'PR "{word}"'),)))
+    shop.session.macros.save(Macro("say", (MacroStep(0.0, 'PR "{word}"'),)))
     await shop.run("/set w 5\n/call say word={w}")
     assert shop.printed() == ["5"]
     assert "no line takes the value wrod" in await shop.failure("/call say wrod=5", Diagnostic)
@@ -191,7 +191,7 @@ async def test_a_stop_ends_a_loop_that_sends_nothing(head, shop):
 async def test_the_reports_agree(tmp_path, capsys):
     text = '@a PR "é<\\x1b"\n/set n 1\n/assert @b P != "\uffff"\n@a XX\n'
     async with Shop(tmp_path) as shop:
-        whole = Report("s.txt", as_json=True, junit=str(tmp_path / "j.xml"))
+        whole = BatchReport("s.txt", as_json=True, junit=str(tmp_path / "j.xml"))
         whole.begin()
         before = ElementTree.parse(tmp_path / "j.xml").getroot()
         await shop.failure(text.replace("é", "e"))
@@ -216,7 +216,7 @@ def test_a_report_replaces_nothing_but_a_report(name, tmp_path):
     if name == "pipe":
         os.mkfifo(tmp_path / name)
     (tmp_path / "script.txt").write_text("MR 100")
-    report = Report("s.txt", junit=str(tmp_path / name))
+    report = BatchReport("s.txt", junit=str(tmp_path / name))
     with pytest.raises(Diagnostic, match="is no") as caught:
         report.begin()
     report.refused(caught.value)  # the end of the command does not write there, either

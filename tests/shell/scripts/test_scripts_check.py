@@ -10,11 +10,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
-from multidrop.macros import Macro, MacroStore, Step
+from multidrop.macros import Macro, MacroStep, MacroStore
 from multidrop.shell.scripts.expression import (
-    LARGEST,
+    LARGEST_NUMBER,
+    DriveQuestion,
     Name,
-    Word,
     evaluate,
     parse,
     parse_check,
@@ -36,7 +36,7 @@ def check(tmp_path, monkeypatch):
     (tmp_path / "both").write_text("")
     store = MacroStore(tmp_path / "macros")
     for name in ("say", "both"):
-        store.save(Macro(name, (Step(0.0, 'PR "{word}"'),)))
+        store.save(Macro(name, (MacroStep(0.0, 'PR "{word}"'),)))
 
     def run(text, **values):
         (tmp_path / "s.txt").write_text(text)
@@ -213,10 +213,10 @@ def test_values(text, result):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("P", [Word("P")]),
-        ("@a P == VM", [Word("P", "a"), Word("VM", "a")]),
-        ("@a P < @press:b P + n", [Word("P", "a"), Word("P", "press:b"), Name("n")]),
-        ("[GAP 1, 0] + @00 [PX]", [Word("GAP 1, 0", line=True), Word("PX", "00", line=True)]),
+        ("P", [DriveQuestion("P")]),
+        ("@a P == VM", [DriveQuestion("P", "a"), DriveQuestion("VM", "a")]),
+        ("@a P < @press:b P + n", [DriveQuestion("P", "a"), DriveQuestion("P", "press:b"), Name("n")]),
+        ("[GAP 1, 0] + @00 [PX]", [DriveQuestion("GAP 1, 0", line=True), DriveQuestion("PX", "00", line=True)]),
     ],
 )
 def test_the_words_of_drives(text, words):
@@ -260,7 +260,7 @@ def test_it_calculates_as_python_does(tree):
         assert value(shown(tree)) == expected
 
 
-@given(st.integers(-LARGEST, LARGEST) | st.floats(-1e6, 1e6))
+@given(st.integers(-LARGEST_NUMBER, LARGEST_NUMBER) | st.floats(-1e6, 1e6))
 def test_a_written_number_is_read_as_the_same_number(number):
     text = written(number)
     assert "e" not in text

@@ -16,7 +16,7 @@ from multidrop.dialects.state import Remembered
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.tmcl.host.codec import Tmcl, TmclState
-from multidrop.shell.state.port_state import MOST, MOST_REPLIED, PortMemory, PortState
+from multidrop.shell.state.port_state import MOST_OWED_ROWS, MOST_REPLIED, PortMemory, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"
 OWED = Owed(1, "a", "LMDCM", "LMDCM 6.002", "LMDCM571", "0401")
@@ -124,7 +124,7 @@ async def test_another_drive_strikes_nothing_out(port):
 
 async def test_several_drives_are_kept_and_the_oldest_forgotten(port):
     state = port()
-    drives = [Owed(2, "a", "LMDCM", "v", "p", str(number)) for number in range(MOST + 3)]
+    drives = [Owed(2, "a", "LMDCM", "v", "p", str(number)) for number in range(MOST_OWED_ROWS + 3)]
     await asyncio.gather(*(state.owes(known(each, each)) for each in drives))
     assert port().owed == tuple(drives[3:])
 

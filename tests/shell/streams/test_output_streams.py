@@ -213,7 +213,7 @@ async def test_a_file_loses_nothing_that_nobody_asked_for(monkeypatch, tmp_path)
 
 @pytest.mark.fork
 async def test_a_disk_that_hangs_loses_what_is_over_the_bound_and_it_is_told(monkeypatch):
-    monkeypatch.setattr(threads, "MOST", 300_000)
+    monkeypatch.setattr(threads, "MOST_HELD_BYTES", 300_000)
     monkeypatch.setattr(output_streams.stat, "S_ISREG", lambda mode: True)  # a pipe that takes 64 kB and then nothing
     with streams(monkeypatch) as (made, reader, errors):
         for _ in range(1000):

@@ -14,7 +14,7 @@ import pytest
 
 from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE
 from multidrop.shell.streams import stdout
-from multidrop.shell.streams.stdout import LONGEST, ReaderWatch, shortened
+from multidrop.shell.streams.stdout import LONGEST_PROBLEM_TEXT, ReaderWatch, shortened
 
 pytestmark = pytest.mark.fork
 
@@ -139,10 +139,13 @@ def test_a_descriptor_that_is_none_has_no_reader(output: Output, monkeypatch: py
 
 
 def test_a_message_is_shortened_in_its_middle_only_where_it_is_too_long() -> None:
-    assert shortened("x" * LONGEST) == "x" * LONGEST
-    text = "a" * LONGEST + "b"
-    half = LONGEST // 2 - 20
-    assert shortened(text) == f"{'a' * half} ... ({LONGEST + 1 - 2 * half} characters) ... {'a' * (half - 1)}b"
+    assert shortened("x" * LONGEST_PROBLEM_TEXT) == "x" * LONGEST_PROBLEM_TEXT
+    text = "a" * LONGEST_PROBLEM_TEXT + "b"
+    half = LONGEST_PROBLEM_TEXT // 2 - 20
+    assert (
+        shortened(text)
+        == f"{'a' * half} ... ({LONGEST_PROBLEM_TEXT + 1 - 2 * half} characters) ... {'a' * (half - 1)}b"
+    )
 
 
 class Screen(io.StringIO):

@@ -11,7 +11,7 @@ from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, NoAnswe
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.exit_codes import exit_code
-from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.event_printer import EventPrinter
 from multidrop.shell.streams.stdout import ReaderWatch, report, write
 from multidrop.transports import Unreachable
 from tests.support.posix import pty
@@ -41,7 +41,7 @@ def test_a_failure_is_one_line_behind_its_place():
 
 
 def test_replies_and_results_go_to_standard_output_and_only_warnings_to_the_other(capsys):
-    printer = Printer()
+    printer = EventPrinter()
     for event in (
         Printed(0.0, "press", "a", "51200"),
         OnBus("press", Unsolicited(0.0, ("!", "12\x1b[2J"))),
@@ -56,7 +56,7 @@ def test_replies_and_results_go_to_standard_output_and_only_warnings_to_the_othe
 
 
 def test_where_a_person_reads_everything_is_told(capsys):
-    printer = Printer(talkative=True)
+    printer = EventPrinter(talkative=True)
     printer.show(Notified(0.0, "opened"))
     printer.show(Failed(0.0, "no"))
     assert capsys.readouterr().err == "opened\nno\n"
@@ -68,7 +68,7 @@ def test_a_reader_that_went_away_is_no_failure(monkeypatch):
             raise BrokenPipeError(32, "Broken pipe")
 
     monkeypatch.setattr(sys, "stdout", Closed())
-    Printer().show(Output(0.0, "line"))
+    EventPrinter().show(Output(0.0, "line"))
     gone = io.StringIO()
     gone.close()
     write(gone, "line")
@@ -76,7 +76,7 @@ def test_a_reader_that_went_away_is_no_failure(monkeypatch):
 
 
 def test_what_a_wire_says_does_not_act_on_the_terminal(capsys):
-    Printer().show(Printed(0.0, "press", "", "\x1b[2Jat\thome\x06\x9b"))
+    EventPrinter().show(Printed(0.0, "press", "", "\x1b[2Jat\thome\x06\x9b"))
     assert capsys.readouterr().out == "\\x1b[2Jat\thome\\x06\\x9b\n"
 
 
@@ -139,7 +139,7 @@ def test_a_reader_that_leaves_interrupts_work_once_and_nothing_after_it(monkeypa
 
 
 def test_what_may_be_a_gateways_greeting_is_not_on_standard_output(capsys):
-    printer = Printer()
+    printer = EventPrinter()
     printer.show(OnBus("gw", Unsolicited(0.0, ("Welcome", "12345\x1b"), greeting=True)))
     printer.show(OnBus("gw", Unsolicited(0.0, ("500",))))
     assert capsys.readouterr() == ("500\n", "")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.simulator.kinematics import Pace, Profile, halt, move, slew
+from multidrop.simulator.kinematics import MotionPace, Profile, halt, move, slew
 
 speeds = st.floats(0, 2_560_000, allow_subnormal=False).map(lambda v: v if v > 1e-3 else 0.0)
 velocities = st.tuples(speeds, st.sampled_from((-1, 1))).map(lambda pair: pair[0] * pair[1])
@@ -24,7 +24,7 @@ def dynamics(draw: st.DrawFn) -> dict[str, float]:
 @st.composite
 def moves(draw: st.DrawFn) -> tuple[Profile, float, dict[str, float]]:
     v0, how = draw(st.one_of(st.just(0.0), velocities)), draw(dynamics())
-    profile = move(draw(times), draw(positions), v0, draw(positions), Pace(**how))
+    profile = move(draw(times), draw(positions), v0, draw(positions), MotionPace(**how))
     return profile, v0, how
 
 
@@ -43,7 +43,7 @@ def slack(profile: Profile) -> float:
 
 
 def test_the_manuals_long_move_has_its_figures() -> None:
-    profile = move(0, 0, 0, 3_840_000, Pace(vi=1000, vm=768_000, a=1e6, d=1e6))
+    profile = move(0, 0, 0, 3_840_000, MotionPace(vi=1000, vm=768_000, a=1e6, d=1e6))
     up, level, down = profile.segments
     assert up.duration == down.duration == pytest.approx(0.767, abs=1e-12)
     assert 2 * level.position == pytest.approx(2 * 294_911.5, abs=1e-6)
@@ -52,14 +52,14 @@ def test_the_manuals_long_move_has_its_figures() -> None:
 
 
 def test_a_move_too_short_for_vm_is_a_triangle() -> None:
-    profile = move(0, 0, 0, 512_000, Pace(vi=200_000, vm=2_500_000, a=1e6, d=1e6))
+    profile = move(0, 0, 0, 512_000, MotionPace(vi=200_000, vm=2_500_000, a=1e6, d=1e6))
     assert len(profile.segments) == 2
     assert profile.velocity(profile.end / 2) == pytest.approx(742_967.0, abs=0.1)
     assert profile.position(profile.end) == 512_000
 
 
 def test_the_velocity_is_vi_at_the_start_and_nothing_at_the_end() -> None:
-    profile = move(2, 10, 0, -5000, Pace(vi=300, vm=1000, a=1e5, d=1e5))
+    profile = move(2, 10, 0, -5000, MotionPace(vi=300, vm=1000, a=1e5, d=1e5))
     assert profile.velocity(1.999) == 0
     assert profile.velocity(2) == -300
     assert profile.velocity(profile.end - 1e-9) == pytest.approx(-300, abs=1)
@@ -69,11 +69,11 @@ def test_the_velocity_is_vi_at_the_start_and_nothing_at_the_end() -> None:
 
 
 def test_a_move_to_where_it_stands_is_over_at_once() -> None:
-    assert move(4, 7, 0, 7, Pace(vi=1, vm=2, a=1, d=1)) == halt(4, 7)
+    assert move(4, 7, 0, 7, MotionPace(vi=1, vm=2, a=1, d=1)) == halt(4, 7)
 
 
 def test_too_fast_to_stop_in_time_it_overshoots_and_comes_back() -> None:
-    profile = move(0, 0, 50_000, 100, Pace(vi=1000, vm=80_000, a=1e6, d=1e6))
+    profile = move(0, 0, 50_000, 100, MotionPace(vi=1000, vm=80_000, a=1e6, d=1e6))
     furthest = max(profile.position(inside(profile, n / 1000)) for n in range(1001))
     assert furthest == pytest.approx((50_000**2 - 1000**2) / 2e6, rel=1e-3)
     turn = profile.segments[1]
@@ -82,27 +82,27 @@ def test_too_fast_to_stop_in_time_it_overshoots_and_comes_back() -> None:
 
 
 def test_above_a_vm_that_was_lowered_it_slows_down_to_it() -> None:
-    profile = move(0, 0, 9000, 100_000, Pace(vi=100, vm=4000, a=1e4, d=1e4))
+    profile = move(0, 0, 9000, 100_000, MotionPace(vi=100, vm=4000, a=1e4, d=1e4))
     assert [segment.velocity for segment in profile.segments] == [9000, 4000, 4000]
     assert [copysign(1, segment.acceleration) for segment in profile.segments] == [-1, 1, -1]
 
 
 def test_a_target_behind_is_reached_by_way_of_a_stop() -> None:
-    profile = move(0, 0, -2000, 3000, Pace(vi=1000, vm=5000, a=1e4, d=1e4))
+    profile = move(0, 0, -2000, 3000, MotionPace(vi=1000, vm=5000, a=1e4, d=1e4))
     assert profile.position(profile.segments[1].start) == pytest.approx(-150)
     assert profile.segments[1].velocity == 1000
     assert profile.target == 3000
 
 
 def test_a_slew_goes_on_for_ever() -> None:
-    profile = slew(1, 5, 0, -8000, Pace(vi=1000, vm=inf, a=7000, d=1))
+    profile = slew(1, 5, 0, -8000, MotionPace(vi=1000, vm=inf, a=7000, d=1))
     assert profile.end == inf and profile.target == -inf
     assert profile.velocity(2) == profile.velocity(1e6) == -8000
     assert profile.position(3) - profile.position(4) == pytest.approx(8000)
 
 
 def test_a_slew_to_nothing_slows_down_to_vi_and_stops() -> None:
-    profile = slew(0, 0, 5000, 0, Pace(vi=1000, vm=inf, a=1, d=2000))
+    profile = slew(0, 0, 5000, 0, MotionPace(vi=1000, vm=inf, a=1, d=2000))
     assert profile.end == pytest.approx(2)
     assert profile.target == profile.position(99) == pytest.approx((5000**2 - 1000**2) / 4000)
 
@@ -125,12 +125,12 @@ def test_a_slew_to_nothing_slows_down_to_vi_and_stops() -> None:
     ],
 )
 def test_a_slew_passes_through_these_velocities(v0: float, velocity: float, starts: list[float]) -> None:
-    profile = slew(0, 0, v0, velocity, Pace(vi=1000, vm=inf, a=1e4, d=1e4))
+    profile = slew(0, 0, v0, velocity, MotionPace(vi=1000, vm=inf, a=1e4, d=1e4))
     assert [segment.velocity for segment in profile.segments] == starts
 
 
 def test_a_crossing_is_found_on_the_way_out_and_on_the_way_back() -> None:
-    profile = move(0, 0, 50_000, 100, Pace(vi=1000, vm=80_000, a=1e6, d=1e6))
+    profile = move(0, 0, 50_000, 100, MotionPace(vi=1000, vm=80_000, a=1e6, d=1e6))
     out = profile.crossing(1000, 0)
     assert profile.velocity(out) > 0
     back = profile.crossing(1000, out + 1e-6)
@@ -141,10 +141,10 @@ def test_a_crossing_is_found_on_the_way_out_and_on_the_way_back() -> None:
 
 def test_standing_at_the_mark_is_no_crossing_and_leaving_it_is_one() -> None:
     assert halt(0, 5).crossing(5, 0) == inf
-    profile = move(1, 5, 0, 500, Pace(vi=10, vm=100, a=1e3, d=1e3))
+    profile = move(1, 5, 0, 500, MotionPace(vi=10, vm=100, a=1e3, d=1e3))
     assert profile.crossing(5, 0) == 1
     assert profile.crossing(500, profile.end) == inf
-    assert slew(0, 0, 0, -10, Pace(vi=10, vm=inf, a=1, d=1)).crossing(-600, 3) == pytest.approx(60)
+    assert slew(0, 0, 0, -10, MotionPace(vi=10, vm=inf, a=1, d=1)).crossing(-600, 3) == pytest.approx(60)
 
 
 @given(moves())
@@ -222,8 +222,8 @@ def test_at_a_crossing_the_mark_is_reached(made: tuple[Profile, float, dict[str,
 def test_a_move_backwards_in_time_is_the_move_back(
     p0: float, target: float, how: dict[str, float], part: float
 ) -> None:
-    there = move(0, p0, 0, target, Pace(**how))
-    back = move(0, target, 0, p0, Pace(**{**how, "a": how["d"], "d": how["a"]}))
+    there = move(0, p0, 0, target, MotionPace(**how))
+    back = move(0, target, 0, p0, MotionPace(**{**how, "a": how["d"], "d": how["a"]}))
     assert back.end == pytest.approx(there.end, rel=1e-6, abs=1e-9)
     t = inside(there, part)
     assert there.position(t) == pytest.approx(back.position(there.end - t), abs=1e-3 + 1e-6 * abs(target - p0))
@@ -235,7 +235,7 @@ def test_a_move_taken_up_on_the_way_ends_when_it_would_have(
 ) -> None:
     profile, _, how = made
     t = inside(profile, part)
-    again = move(t, profile.position(t), profile.velocity(t), profile.target, Pace(**how))
+    again = move(t, profile.position(t), profile.velocity(t), profile.target, MotionPace(**how))
     assert again.target == profile.target
     if profile.velocity(t) and len(profile.segments) <= 3 and abs(profile.velocity(t)) >= how["vi"]:
         assert again.end == pytest.approx(profile.end, rel=1e-3, abs=1e-3)
@@ -245,7 +245,7 @@ def test_a_move_taken_up_on_the_way_ends_when_it_would_have(
 def test_a_slew_gets_to_its_velocity_without_a_jump_in_position(
     at: float, p0: float, v0: float, velocity: float, how: dict[str, float], later: float
 ) -> None:
-    profile = slew(at, p0, v0, velocity, Pace(vi=how["vi"], vm=inf, a=how["a"], d=how["d"]))
+    profile = slew(at, p0, v0, velocity, MotionPace(vi=how["vi"], vm=inf, a=how["a"], d=how["d"]))
     ends = [segment.position_at(segment.start + segment.duration) for segment in profile.segments[:-1]]
     for segment, before in zip(profile.segments[1:], ends, strict=True):
         assert segment.position == pytest.approx(before, abs=slack(profile) if profile.end < inf else 1.0)

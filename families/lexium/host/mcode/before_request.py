@@ -27,7 +27,7 @@ from multidrop.families.lexium.host.mcode.exchange import (
 )
 from multidrop.families.lexium.host.mcode.framing import NAK
 from multidrop.families.lexium.host.mcode.identity import activate_party, asked, find, find_in_text, look_in, pinged
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place
+from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace
 from multidrop.families.lexium.manual.mnemonic import ETHERNET
 
 T = TypeVar("T")
@@ -82,8 +82,8 @@ def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
     expected = state.unconfirmed
     assert expected is not None
     state.sought()
-    found = yield from (find(state, expected.place) if expected.stated else _find_anywhere(state, expected.place))
-    if not found:
+    replied = yield from (find(state, expected.place) if expected.stated else _find_anywhere(state, expected.place))
+    if not replied:
         state.settings_may_have_changed()
         raise NoAnswer(f"{who(state)} does not reply: '{text}' {fate}")
     last, codec = expected.last, state.codec
@@ -103,16 +103,16 @@ def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
         state.note(f"{who(state)}: its settings are not those of last time ({codec.shown}); they were read again")
 
 
-def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:
+def _find_anywhere(state: MCodeState, place: ReplyPlace) -> Procedure[bool]:
     """Look for a drive where it was last time, then in the other place: party mode, or none."""
     name = state.name or state.address
     if place.party:
-        alone = Place(False, "")
+        alone = ReplyPlace(False, "")
         return (yield from find_in_text(state, place)) or (yield from find(state, alone))
     if (yield from find(state, place)):
         return True
     yield from activate_party(state.codec)
-    return bool(name) and (yield from find(state, Place(True, name)))
+    return bool(name) and (yield from find(state, ReplyPlace(True, name)))
 
 
 def _unseen(state: MCodeState, request: Request) -> bool:
@@ -150,8 +150,8 @@ def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
 def find_again(state: MCodeState, request: Request) -> Procedure[None]:
     """Read the drive's present settings. Raises NoAnswer where it is silent."""
     before = state.codec
-    places = [Place(before.party, state.address, (0, 1) if before.checksum else (0,))]
-    places += [Place(codec.party, address) for codec, address in state.candidates]
+    places = [ReplyPlace(before.party, state.address, (0, 1) if before.checksum else (0,))]
+    places += [ReplyPlace(codec.party, address) for codec, address in state.candidates]
     if not (yield from look_in(state, places, request.priority)):
         state.settings_may_have_changed()
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
@@ -206,7 +206,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     raise unanswered(who(state), request)
 
 
-def _present(state: MCodeState, place: Place) -> Procedure[Place | None]:
+def _present(state: MCodeState, place: ReplyPlace) -> Procedure[ReplyPlace | None]:
     """Make sure that the drive replies; return the place with its checksum, None where that is not certain.
 
     This comes before the person's line, so that half a line in the drive's buffer does not spoil that one.
@@ -223,7 +223,7 @@ def _present(state: MCodeState, place: Place) -> Procedure[Place | None]:
     return None
 
 
-def _form(state: MCodeState, place: Place, checksum: int) -> MCode:
+def _form(state: MCodeState, place: ReplyPlace, checksum: int) -> MCode:
     """The form of a print that every echo mode shows."""
     return replace(state.codec, em=2, party=place.party, checksum=checksum, escape=None)
 

@@ -18,10 +18,10 @@ from multidrop.families.lexium.host.mcode import framing
 from multidrop.families.lexium.host.mcode.quiet import SHORT, Received
 from multidrop.families.lexium.host.mcode.reply_lines import ENDLESS, ReplyLines, divided
 from multidrop.families.lexium.host.mcode.reply_parser import ReplyParser
-from multidrop.families.lexium.manual.program_file import LONGEST, commented, spaced, unsendable
+from multidrop.families.lexium.manual.program_file import LONGEST_PROGRAM_LINE, commented, spaced, unsendable
 from multidrop.families.lexium.manual.statements import UNNAMED
 
-APART = 0.03
+STOP_PIECE_QUIET = 0.03
 """Seconds of quiet after a line of a stop, so that its reply does not collide with the next line."""
 
 
@@ -38,10 +38,10 @@ def short_reply(request: Request, buffer: bytes) -> Decoded | None:
     """Return the reply of a drive with EM=1 or 2 and CK=0, if it is one line and can only be the requested print."""
     if request.kind is not Kind.PRINT or request.expect is None:
         return None
-    found = ONE_LINE.fullmatch(buffer)
-    if found is None:
+    match = ONE_LINE.fullmatch(buffer)
+    if match is None:
         return None
-    line = found[1].decode("ascii")
+    line = match[1].decode("ascii")
     if "opyright" in line or re.fullmatch(request.expect, line) is None:  # a sign-on may match, too
         return None
     return Decoded(Reply((line,)), len(buffer))
@@ -75,7 +75,7 @@ def without_end(request: Request, buffer: bytes, em: int, checksum: int) -> bool
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 EVERY_DRIVE = ("*", "^")
-SILENT = (Kind.COMMAND, Kind.PROGRAM)
+SILENT_KINDS = (Kind.COMMAND, Kind.PROGRAM)
 """Kinds of requests that print no line."""
 LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
 """A possible prompt after a list; without it a list is not parsed at each read."""
@@ -87,7 +87,7 @@ TO_PARTY = NOBODY.encode() + b"\n\n"
 party mode."""
 ANSWER = re.compile(r'(?:[^\s"]"[!-~]"|~\w?\d{0,4}(?:"[!-~]")?|PR [^\r\n]*,(?:DN|"~\w*"))[\x80-\xff]?\Z')
 """The end of a signed print: a name after a value, or a mark (`exchange`); of its repetition."""
-STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d}[\r\n]" % (LONGEST + 1))
+STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d}[\r\n]" % (LONGEST_PROGRAM_LINE + 1))
 """Any key that stops, alone or after names, Ctrl+C, which resets, and what makes a half-sent line overflow."""
 
 
@@ -121,12 +121,12 @@ class MCode(Codec):
             raise Inexpressible(f"no drive name '{address}'; valid: one letter or digit, or !")
         kind = kind or classify.kind_of(text)
         request = Request(
-            address, text, kind, self, expect=classify.NOTHING if kind in SILENT else classify.print_form(text)
+            address, text, kind, self, expect=classify.NOTHING if kind in SILENT_KINDS else classify.print_form(text)
         )
         size = len(self._frame(request))
-        if size > LONGEST:
+        if size > LONGEST_PROGRAM_LINE:
             raise Inexpressible(
-                f"the line has {size} characters with name and checksum; a drive takes {LONGEST}; "
+                f"the line has {size} characters with name and checksum; a drive takes {LONGEST_PROGRAM_LINE}; "
                 "shorten it (nothing was sent)"
             )
         return replace(request, kind=Kind.QUIET, settle=SHORT, expect=None) if address in EVERY_DRIVE else request
@@ -165,8 +165,8 @@ class MCode(Codec):
         if without_end(request, buffer, self.em, self.checksum):
             return None
         if not self.checksum and self.em in (1, 2):
-            if (found := short_reply(request, buffer)) is not None:
-                return found
+            if (decoded := short_reply(request, buffer)) is not None:
+                return decoded
             if only_strays(request, buffer):
                 return None
         if request.kind in ENDLESS and not (self.em == 0 and request.kind is Kind.LIST and LIST_PROMPT.search(buffer)):
@@ -252,7 +252,7 @@ class MCode(Codec):
         """Return the end of the program, then SL 0, in party mode: no drive but the named one reads these lines."""
         if not self.party or not (len(address) == 1 and "!" <= address <= "~") or address in EVERY_DRIVE:
             return ()
-        return tuple(StopPiece(self.encode(self.request(address, text)), APART) for text in ("E", "SL 0"))
+        return tuple(StopPiece(self.encode(self.request(address, text)), STOP_PIECE_QUIET) for text in ("E", "SL 0"))
 
     def repeated(self, sent: bytes, rest: bytes, over: bool) -> bool:
         """Tell an adapter's repetition from a drive's (5.1.39): a drive makes CR LF of a CR.
@@ -280,4 +280,4 @@ class MCode(Codec):
 
     def invalidate(self) -> bytes:
         """Return a full buffer of tildes: the half-sent line overflows, which every drive refuses (5.1.102)."""
-        return b"~" * (LONGEST + 1) + self.terminator
+        return b"~" * (LONGEST_PROGRAM_LINE + 1) + self.terminator

@@ -25,7 +25,7 @@ from multidrop.families.lexium.host.mcode.exchange import printed_value
 from multidrop.families.lexium.host.mcode.framing import printable
 from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.state import MCodeState
-from multidrop.families.lexium.manual.grammar import Name, Number, parsed
+from multidrop.families.lexium.manual.grammar import NameTerm, Number, parsed
 from multidrop.families.lexium.manual.mnemonic import MDRIVE_PLUS
 from multidrop.families.lexium.manual.table import lookup
 
@@ -96,7 +96,7 @@ _LISTED = re.compile(r"\s*(\d+)\s+(\S.*)")
 _USER = re.compile(r"\s*(\w+)\s*=\s*[GL]\s+(\S+)\s*")
 """A variable in the print of PR UV."""
 JUMPS = ("BR", "CL")
-FIRST = "1"
+FIRST_ADDRESS = "1"
 BEGIN = "/step LABEL begins single step, /break now breaks a program that runs"
 
 
@@ -132,14 +132,14 @@ def _check_steps(state: MCodeState) -> None:
 
 def _places(program: Sequence[Stored]) -> Mapping[str, int]:
     """The addresses by label, and by themselves."""
-    found = {str(row.at): row.at for row in program}
+    places = {str(row.at): row.at for row in program}
     for row in program:
         statement = parsed(row.text)
         if statement is not None and statement.word == "LB" and statement.arguments:
             label = statement.arguments[0]
-            if isinstance(label, Name):
-                found[label.word] = row.at
-    return found
+            if isinstance(label, NameTerm):
+                places[label.word] = row.at
+    return places
 
 
 def _code_at(program: Sequence[Stored], address: int) -> int | None:
@@ -172,12 +172,12 @@ class MCodeDebugging(Debugging):
         if (yield from MCodeOperations(state).flag("LK")):
             raise Refused(f"{who(state)}: its program is locked (LK=1), so it is neither listed, traced nor stepped")
         lines = yield from MCodeOperations(state).listing("")
-        found = [each for line in lines if (each := _LISTED.fullmatch(line))]
-        return tuple(Stored(int(each[1]), each[2]) for each in found)
+        matches = [match for line in lines if (match := _LISTED.fullmatch(line))]
+        return tuple(Stored(int(each[1]), each[2]) for each in matches)
 
     def entry(self, rows: Sequence[Stored]) -> str:
         """Return SU where the program has it, else the first address."""
-        return "SU" if _places(rows).get("SU") else FIRST
+        return "SU" if _places(rows).get("SU") else FIRST_ADDRESS
 
     def address(self, rows: Sequence[Stored], place: str) -> int | None:
         """Return the address of the first line at a place that is not a label."""
@@ -195,7 +195,7 @@ class MCodeDebugging(Debugging):
         runs = yield from MCodeOperations(state).flag("BY")  # which may find other settings
         if neighbours is None:
             _check_keys(state)
-        elif state.codec.party and (digits := [each for each in neighbours if each.isdigit()]):
+        elif state.codec.party and (digits := [neighbour for neighbour in neighbours if neighbour.isdigit()]):
             raise Refused(
                 f"{who(state)}: a traced line begins with a number, and drive {digits[0]} on this line may take it for "
                 "a command; not started"
@@ -314,21 +314,21 @@ class MCodeDebugging(Debugging):
     def values(self, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
         """Read variables. User variables come from PR UV: to ask for one that is not there would be an error."""
         state = self.state
-        found: dict[str, str] = {}
+        values: dict[str, str] = {}
         users = [name for name in names if lookup(name, state.product) is None]
         listed = (yield from MCodeOperations(state).perform("PR UV")) if users else ()
-        declared = {each[1].upper(): each[2] for line in listed if (each := _USER.fullmatch(line))}
+        declared = {match[1].upper(): match[2] for line in listed if (match := _USER.fullmatch(line))}
         for name in names:
             if name in users:
-                found.update({name: declared[name]} if name in declared else {})
+                values.update({name: declared[name]} if name in declared else {})
             else:
-                found[name] = " ".join((yield from MCodeOperations(state).perform(f"PR {name}")))
-        return found
+                values[name] = " ".join((yield from MCodeOperations(state).perform(f"PR {name}")))
+        return values
 
     def traced(self, line: str) -> Stored | None:
         """Return the executed line that a printed line shows."""
-        found = TRACED.fullmatch(line)
-        return Stored(int(found[1]), found[2]) if found else None
+        match = TRACED.fullmatch(line)
+        return Stored(int(match[1]), match[2]) if match else None
 
     def _hold(self, text: str) -> Procedure[float | None]:
         """Seconds for which a line holds; a variable is read."""
@@ -336,7 +336,7 @@ class MCodeDebugging(Debugging):
             return seconds
         statement = parsed(text)
         argument = statement.arguments[0] if statement is not None else None
-        read = (yield from self.values([argument.word])) if isinstance(argument, Name) else {}
+        read = (yield from self.values([argument.word])) if isinstance(argument, NameTerm) else {}
         figure = "".join(read.values())
         return int(figure) / 1000 if figure.isdecimal() else None
 

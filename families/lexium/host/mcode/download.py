@@ -44,7 +44,7 @@ from multidrop.families.lexium.host.mcode.program_readout import (
     LABEL,
     LOCAL,
     MCodeReadout,
-    Program,
+    ReadProgram,
     declared,
     immediate_lines,
     names_of,
@@ -62,14 +62,14 @@ WHOLE = {"", "0", "1", "S"}
 
 
 @dataclass
-class Plan:
+class DownloadPlan:
     """The lines to send for a file, and the programs that CP removes: they go, or are stored again."""
 
     lines: list[ProgramLine] = field(default_factory=list)
     in_the_way: list[str] = field(default_factory=list)
     """Names of programs in the drive that the file gives again."""
-    replaced: list[Program] = field(default_factory=list)
-    kept: list[Program] = field(default_factory=list)
+    replaced: list[ReadProgram] = field(default_factory=list)
+    kept: list[ReadProgram] = field(default_factory=list)
 
     @property
     def clears(self) -> bool:
@@ -97,7 +97,7 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     return again + made.lines
 
 
-def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "") -> Plan:
+def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "") -> DownloadPlan:
     """Plan the lines for a drive that holds these programs and names. Raises Refused."""
     made = _named_lines(lines, held, drive, product)
     if clears_itself(lines):
@@ -105,14 +105,14 @@ def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "")
     names = names_of(held)
     starts = [(each.start(names), each.lines) for each in programs_of(lines)]
     spans = [(at, at + sum(size(line.text, product) for line in inside)) for at, inside in starts if at is not None]
-    found = [each for line in lines if (each := declared(line.text)) is not None]
-    outside = [each for line in immediate_lines(lines) if (each := declared(line.text)) is not None]
-    no_local = {name for word, name in found if word == "LB"} | {name for _, name in outside}
+    declarations = [declaration for line in lines if (declaration := declared(line.text)) is not None]
+    outside = [declaration for line in immediate_lines(lines) if (declaration := declared(line.text)) is not None]
+    no_local = {name for word, name in declarations if word == "LB"} | {name for _, name in outside}
     for program in programs(held.lines, product):
         over = [(at, end) for at, end in spans if at < program.end and program.start < end]
         gone = any(not (program.start < at and end <= program.end) for at, end in over)  # a part of it replaces nothing
         # A name is given again: as a label in one of both, or a local name as a global.
-        shared = program.declared("LB") & {name for _, name in found} or program.declared("VA") & no_local
+        shared = program.declared("LB") & {name for _, name in declarations} or program.declared("VA") & no_local
         (made.replaced if gone or shared else made.kept).append(program)
     return made
 
@@ -124,10 +124,10 @@ def clears_itself(lines: Sequence[SourceLine]) -> bool:
     return any(word == "FD" or (word == "CP" and rest.upper() in WHOLE) for word, rest in before)
 
 
-def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: str) -> Plan:
+def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: str) -> DownloadPlan:
     """Plan what becomes of the names that a file declares. Raises Refused."""
     known = {name: called.kind for name, called in names_of(held).items()}
-    own, made, inside = set[str](), Plan(), False
+    own, made, inside = set[str](), DownloadPlan(), False
     for line in lines:
         word, name = declared(line.text) or ("", "")
         is_a = known.get(name, "")
@@ -159,8 +159,8 @@ def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: s
     return made
 
 
-def _cleared(made: Plan, labels: Iterable[str], lines: Sequence[SourceLine]) -> str:
-    mine = {found[1] for line in lines if (found := declared(line.text))}
+def _cleared(made: DownloadPlan, labels: Iterable[str], lines: Sequence[SourceLine]) -> str:
+    mine = {declaration[1] for line in lines if (declaration := declared(line.text))}
     stay = {name for program in made.kept for name in program.declared("LB")}
     gone = ", ".join(name for name in labels if name not in mine | stay)
     which = ", ".join(str(program.start) for program in made.replaced)

@@ -61,14 +61,14 @@ class MCodeFamily(MCodeOperations, LexiumFamily):
         if hints.lazy and not (hints.cut or hints.owed) and (expected := expected_places(hints)):
             if expected[0].place.party:
                 yield from wake(TO_PARTY if expected[0].stated else IN_TEXT)
-            return [expected_state(each, hints) for each in expected]
+            return [expected_state(place, hints) for place in expected]
         if not hints.cut:
             return [*(yield from look_around(hints))]
         yield from overflow(hints.drives or (UNNAMED,))
-        found = yield from look_around(hints)
-        for state in found:  # their stops are known now, and an error's subroutine may have started since
+        states = yield from look_around(hints)
+        for state in states:  # their stops are known now, and an error's subroutine may have started since
             yield from write_stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
-        return [*found]
+        return [*states]
 
     def guard(self, text: str) -> Guard | None:
         state, starts = self.state, classify.starts_motion

@@ -17,7 +17,7 @@ _WHAT = {LF: "line", ACK: "ack", NAK: "nak"}
 
 
 @dataclass(frozen=True)
-class Piece:
+class ReplyPiece:
     """One part of a reply: a line without its CRLF, an ACK or NAK, the text before one, or the unfinished rest."""
 
     what: str
@@ -31,23 +31,23 @@ class Piece:
         return self.data.replace(CR, b"")
 
 
-def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[Piece]:
+def pieces(buffer: bytes, start: int, acknowledged: bool) -> list[ReplyPiece]:
     """Cut the buffer from `start` into lines, ACKs and NAKs (if the drive sends them), and the rest."""
-    found: list[Piece] = []
+    pieces: list[ReplyPiece] = []
     begin = start
     for match in _ENDS[acknowledged].finditer(buffer, start):
         text, end = buffer[begin : match.start()], match.end()
         what = _WHAT[match.group()]
         if what == "line":
-            found.append(Piece("line", text.removesuffix(CR), begin, end))
+            pieces.append(ReplyPiece("line", text.removesuffix(CR), begin, end))
         else:
             if text.strip(CR):
-                found.append(Piece("glued", text, begin, match.start()))
-            found.append(Piece(what, b"", match.start(), end))
+                pieces.append(ReplyPiece("glued", text, begin, match.start()))
+            pieces.append(ReplyPiece(what, b"", match.start(), end))
         begin = end
     if buffer[begin:].strip(CR):
-        found.append(Piece("rest", buffer[begin:], begin, len(buffer)))
-    return found
+        pieces.append(ReplyPiece("rest", buffer[begin:], begin, len(buffer)))
+    return pieces
 
 
 def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] | None:
@@ -63,10 +63,10 @@ def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] |
 
 def _echoed(frame: bytes, buffer: bytes, follows: tuple[bytes, ...] = ()) -> tuple[int, bytes] | None:
     """Match a frame. `follows`: the bytes allowed after an echo that prints interrupted; empty: any."""
-    found = 0
+    reached = 0
     for character in frame:  # a cheap test that a damaged echo fails: the characters of the frame in their order
-        found = buffer.find(character, found) + 1
-        if not found:
+        reached = buffer.find(character, reached) + 1
+        if not reached:
             return None
     seen: set[tuple[int, int]] = set()
     todo = [(0, 0, b"")]

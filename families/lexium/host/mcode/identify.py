@@ -36,7 +36,7 @@ from multidrop.families.lexium.host.mcode.identity import (
     find_in_text,
 )
 from multidrop.families.lexium.host.mcode.operations import put_back_found
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
+from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace, Unconfirmed
 from multidrop.families.lexium.manual.statements import UNNAMED
 
 IN_TEXT = TEXT + b"\n\n"
@@ -46,14 +46,14 @@ SEARCH = "multidrop scan PORT tries every name and baud rate"
 
 def expected_places(hints: Hints) -> list[Unconfirmed]:
     """Return where the drives are, by the user's hints or from last time; nothing where one is not known."""
-    last = {each.address: each for each in hints.remembered}
+    last = {remembered.address: remembered for remembered in hints.remembered}
     party, checks = _party(hints), _checks(hints)
     if party is False or (party is None and "" in last and hints.drives in ((), (last[""].name,))):
-        return [Unconfirmed(Place(False, "", checks), last.get(""), party is False)]
+        return [Unconfirmed(ReplyPlace(False, "", checks), last.get(""), party is False)]
     tried = _tried(hints)
     names = hints.drives or (tried if all(name in last for name in tried) else ())
     if (party and hints.drives) or (names and names[0] in last):
-        return [Unconfirmed(Place(True, name, checks), last.get(name), party is True) for name in names]
+        return [Unconfirmed(ReplyPlace(True, name, checks), last.get(name), party is True) for name in names]
     return []
 
 
@@ -86,7 +86,7 @@ def look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         if sole is not None:
             return [sole]
     if not party:
-        place = Place(False, "", _checks(hints))
+        place = ReplyPlace(False, "", _checks(hints))
         alone = _new_state(place, hints)
         if (yield from _find(alone, place, hints)):
             return [alone]
@@ -96,14 +96,16 @@ def look_around(hints: Hints) -> Procedure[list[MCodeState]]:
                 f"{SEARCH}"
             )
     yield from wake(TO_PARTY)
-    found = []
+    states = []
     for name in hints.drives or (UNNAMED,):
-        found.append((yield from _named(name, hints)))
-        hints = replace(hints, em=found[-1].codec.em if found[-1].product else hints.em)  # the next is likely set alike
-    present = [state for state in found if state.product]
+        states.append((yield from _named(name, hints)))
+        hints = replace(
+            hints, em=states[-1].codec.em if states[-1].product else hints.em
+        )  # the next is likely set alike
+    present = [state for state in states if state.product]
     if not present:
         raise NoAnswer(_no_reply(hints, party))
-    return [state if state.product else _absent(state, present[0]) for state in found]
+    return [state if state.product else _absent(state, present[0]) for state in states]
 
 
 def _tried(hints: Hints) -> tuple[str, ...]:
@@ -113,7 +115,7 @@ def _tried(hints: Hints) -> tuple[str, ...]:
 
 def _last_names(hints: Hints) -> tuple[str, ...]:
     """Return the names of last time's party line, in order: the first is selected, whichever was used last."""
-    return tuple(sorted(each.address for each in hints.remembered if each.party))
+    return tuple(sorted(remembered.address for remembered in hints.remembered if remembered.party))
 
 
 def _likely(names: Sequence[str], hints: Hints) -> Procedure[list[MCodeState]]:
@@ -121,22 +123,22 @@ def _likely(names: Sequence[str], hints: Hints) -> Procedure[list[MCodeState]]:
 
     Where one replies, those that are silent are listed too: a line for the first of them must not get to the next.
     """
-    last = {each.address: each for each in hints.remembered}
-    found: list[MCodeState] = []
+    last = {remembered.address: remembered for remembered in hints.remembered}
+    likely: list[MCodeState] = []
     for name in names:
         own = replace(hints, drives=(name,))
-        state = (yield from _named(name, own)) if found else (yield from _by_name_first(own))
+        state = (yield from _named(name, own)) if likely else (yield from _by_name_first(own))
         if state is not None and state.product:
-            found.append(state)
+            likely.append(state)
             hints = replace(hints, em=state.codec.em)
-    present = {state.address: state for state in found}
+    present = {state.address: state for state in likely}
     states = []
-    for name in names if found else ():
-        state = present.get(name) or _new_state(Place(True, name, _checks(hints)), hints)
+    for name in names if likely else ():
+        state = present.get(name) or _new_state(ReplyPlace(True, name, _checks(hints)), hints)
         if name not in present and name in last:
-            state = expected_state(Unconfirmed(Place(True, name, _checks(hints)), last[name]), hints)
+            state = expected_state(Unconfirmed(ReplyPlace(True, name, _checks(hints)), last[name]), hints)
             state.note(f"{who(state)} replied here last time, and does not reply")
-        states.append(state if name in present or name in last else _absent(state, found[0]))
+        states.append(state if name in present or name in last else _absent(state, likely[0]))
     return states
 
 
@@ -160,7 +162,7 @@ def _by_name_first(hints: Hints) -> Procedure[MCodeState | None]:
         ended = yield from end_text()
         if END_OF_TEXT in ended.raw or TEXT in (yield from wake(IN_TEXT)).raw:
             return None
-    place = Place(True, hints.drives[0], _checks(hints))
+    place = ReplyPlace(True, hints.drives[0], _checks(hints))
     state = _new_state(place, hints)
     if not (yield from find_in_text(state, place)):
         return None
@@ -176,7 +178,7 @@ def wake(spoiler: bytes) -> Procedure[Reply]:
 
 def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
     """Find one of several drives; a failure with one does not prevent finding the others."""
-    place = Place(True, name, _checks(hints))
+    place = ReplyPlace(True, name, _checks(hints))
     state, silent = _new_state(place, hints), _new_state(place, hints)
     try:
         return state if (yield from _find(state, place, hints)) else silent
@@ -185,7 +187,7 @@ def _named(name: str, hints: Hints) -> Procedure[MCodeState]:
         return silent
 
 
-def _new_state(place: Place, hints: Hints) -> MCodeState:
+def _new_state(place: ReplyPlace, hints: Hints) -> MCodeState:
     return MCodeState(MCode(em=hints.em or 0, party=place.party), place.address, sync_marks=hints.first_mark)
 
 
@@ -201,9 +203,9 @@ def _absent(state: MCodeState, like: MCodeState) -> MCodeState:
     return state
 
 
-def _find(state: MCodeState, place: Place, hints: Hints) -> Procedure[bool]:
+def _find(state: MCodeState, place: ReplyPlace, hints: Hints) -> Procedure[bool]:
     """Find one drive and its settings, and restore what it is owed; False where it is silent."""
-    found = yield from find(state, place)
-    if found:
+    replied = yield from find(state, place)
+    if replied:
         yield from put_back_found(state, hints.owed)
-    return found
+    return replied

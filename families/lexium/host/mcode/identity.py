@@ -19,14 +19,14 @@ from multidrop.base.errors import NoAnswer, Refused
 from multidrop.dialects.codec import Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.state import who
 from multidrop.families.lexium.host import classify
-from multidrop.families.lexium.host.classify import NOTHING, Setting
+from multidrop.families.lexium.host.classify import NOTHING, LineSetting
 from multidrop.families.lexium.host.mcode.codec import NOBODY, MCode
 from multidrop.families.lexium.host.mcode.exchange import answered, as_printed, fresh, refused, take_out
 from multidrop.families.lexium.host.mcode.framing import NAK, sealed
-from multidrop.families.lexium.host.mcode.quiet import PONG, SLOWEST, pongs
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place
+from multidrop.families.lexium.host.mcode.quiet import PONG, SLOWEST_BYTES_A_SECOND, pongs
+from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace
 from multidrop.families.lexium.manual.mnemonic import ETHERNET
-from multidrop.families.lexium.manual.program_file import LONGEST
+from multidrop.families.lexium.manual.program_file import LONGEST_PROGRAM_LINE
 from multidrop.families.lexium.manual.statements import UNNAMED
 
 # The settings of a drive that may have changed.
@@ -38,46 +38,46 @@ from multidrop.families.lexium.manual.statements import UNNAMED
 
 
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
-TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
+MOST_TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2
 """Limits of the attempts in one form: in all, in silence, with NAK, with nothing printed."""
 REPETITION = re.compile(rb'[!-~]?PR [^\r\n]*"~\w*"(?:,DN)?[\x80-\xff]?')
 BRIEF = 0.25
 """A quarter of the time (s) to wait for a reply while a program prints without a pause."""
 
 
-def places_after(state: MCodeState, setting: Setting) -> list[Place]:
+def places_after(state: MCodeState, setting: LineSetting) -> list[ReplyPlace]:
     """List where the drive may reply after a change of settings, the likeliest place first.
 
     The old name goes before a new one: where the line was lost, another drive may bear the new name.
     """
     mode, name, value = state.codec, setting.name, setting.value
     same = (int(mode.checksum > 0),)
-    here = Place(mode.party, state.address, same)
-    off, on = Place(False, "", same), Place(True, state.address or state.name or UNNAMED, same)
+    here = ReplyPlace(mode.party, state.address, same)
+    off, on = ReplyPlace(False, "", same), ReplyPlace(True, state.address or state.name or UNNAMED, same)
     if name == "CK":
         return [replace(here, checks=(0, 1))]
     if name == "DN" and value and mode.party:
-        return [here, Place(True, value, same)]
+        return [here, ReplyPlace(True, value, same)]
     if name == "PY":
         return [on, off] if value == "1" else [off, on]
     if name == "FD":
-        return [Place(False, "", (0,)), here]
+        return [ReplyPlace(False, "", (0,)), here]
     if name == "IP":
         return [replace(here, checks=(0, 1)), replace(off if mode.party else on, checks=(0, 1))]
     return [here]
 
 
-def look_in(state: MCodeState, places: Sequence[Place], priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
+def look_in(state: MCodeState, places: Sequence[ReplyPlace], priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
     """Look for the drive in each place in turn; record the settings that it prints."""
     party = state.codec.party
     for place in places:
         if place.party and not party:
             yield from activate_party(state.codec, priority)
-        found = yield from look(state, place, settings_asked, priority)
-        if found is not None:
-            form, said = found
+        identified = yield from look(state, place, settings_asked, priority)
+        if identified is not None:
+            form, said = identified
             take_over(state, place.address, form, said[:3], said[7:])
-        if found is not None:
+        if identified is not None:
             return True
         party = place.party
     if not party and any(place.party for place in places):  # the last text must not stay in other drives' buffers
@@ -102,7 +102,10 @@ def settings_asked(form: MCode) -> tuple[str, str]:
 
 
 def look(
-    state: MCodeState, place: Place, what: Callable[[MCode], tuple[str, str]], priority: Priority = Priority.OPERATOR
+    state: MCodeState,
+    place: ReplyPlace,
+    what: Callable[[MCode], tuple[str, str]],
+    priority: Priority = Priority.OPERATOR,
 ) -> Procedure[tuple[MCode, str] | None]:
     """Have the drive at a place print something that is certainly its own; return the codec it used and the text.
 
@@ -110,7 +113,7 @@ def look(
     """
     checks, tried, stored, naks = list(place.checks), 0, 0, 0
     enough = 1 if state.codec.checksum else NAKS  # a NAK that is expected proves more
-    while checks and tried < TRIES:
+    while checks and tried < MOST_TRIES:
         tried += 1
         form = replace(state.codec, em=2, party=place.party, checksum=checks[0], escape=None)
         text, reply = yield from asked(state, place.address, form, *what(form), priority)
@@ -128,7 +131,7 @@ def look(
             yield from take_out(state, "was in program mode and was taken out with PG; check the program in it")
         elif naks == enough and not form.checksum:
             checks, tried = [1], 0
-        elif tried == TRIES or (not reply.raw and tried >= SILENCES):
+        elif tried == MOST_TRIES or (not reply.raw and tried >= SILENCES):
             checks, tried = checks[1:], 0
     return None
 
@@ -140,16 +143,16 @@ def asked(
     mark = fresh(state, address, form.party)
     expect = f"({pattern}){re.escape(mark.shown)}"
     text = f"PR {items},{mark.item}"
-    timeout = BRIEF + len(text) / SLOWEST
+    timeout = BRIEF + len(text) / SLOWEST_BYTES_A_SECOND
     rows = NOTHING if state.product else None  # at an opening, what is left of an earlier session comes, too
     reply = yield Request(
         address, text, Kind.QUIET, form, priority, timeout=timeout, expect=expect, rows=rows, signed=True
     )
-    for found in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
-        if not form.checksum or found[0].rstrip("\r\n").encode("latin-1") == sealed(
-            (found[1] + mark.shown).encode("latin-1")
+    for match in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
+        if not form.checksum or match[0].rstrip("\r\n").encode("latin-1") == sealed(
+            (match[1] + mark.shown).encode("latin-1")
         ):
-            return found[1], reply
+            return match[1], reply
     return "", reply
 
 
@@ -170,14 +173,14 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
     """Send a communication setting, then read the drive's settings. Raises Refused or NoAnswer."""
     setting = classify.setting_of(request.text)
     assert setting is not None
-    places, before, found = places_after(state, setting), who(state), False
+    places, before, replied = places_after(state, setting), who(state), False
     try:
         yield from answered(state, request)
-        found = yield from look_in(state, places)
+        replied = yield from look_in(state, places)
     finally:
-        if not found:  # stopped or lost before the settings were read, or an error that need not come from this line
+        if not replied:  # stopped or lost before the settings were read, or an error that need not come from this line
             _lose(state, places)
-    if not found:
+    if not replied:
         raise NoAnswer(f"{before} was sent '{request.text}' and does not reply now; open it again later")
     if state.error:
         yield from refused(state, request)
@@ -190,7 +193,7 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
         raise Refused(f"{before} did not adopt '{request.text}': {state.codec.shown}")
 
 
-def _holds(state: MCodeState, setting: classify.Setting) -> bool:
+def _holds(state: MCodeState, setting: classify.LineSetting) -> bool:
     """Whether the drive has the value that the line set, where the line showed one."""
     mode, value = state.codec, setting.value
     if value is None:
@@ -202,9 +205,9 @@ def _holds(state: MCodeState, setting: classify.Setting) -> bool:
     return value == str({"EM": mode.em, "PY": int(mode.party), "CK": mode.checksum, "ES": mode.escape}[setting.name])
 
 
-def _lose(state: MCodeState, places: list[Place]) -> None:
+def _lose(state: MCodeState, places: list[ReplyPlace]) -> None:
     """Record that the settings are unknown: they are read before the next request."""
-    state.settings_lost([(replace(state.codec, party=each.party), each.address) for each in places])
+    state.settings_lost([(replace(state.codec, party=place.party), place.address) for place in places])
 
 
 # Half a line in the drives' buffers, from an interrupted use of the port: it is made to overflow between stops.
@@ -217,7 +220,9 @@ def overflow(names: Sequence[str]) -> Procedure[None]:
     """
     form = MCode(party=True)
     stop = form.stop(names, sure=False)
-    spoiled = form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST + 1) + b"\r\n" + stop
+    spoiled = (
+        form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST_PROGRAM_LINE + 1) + b"\r\n" + stop
+    )
     yield from write_stop(spoiled)
     yield from write_stop(stop)  # a subroutine of OE may have started late
 
@@ -244,21 +249,21 @@ TEXT = b'PR "~'
 END_OF_TEXT = b'"'
 SETTLE = 0.03
 """Quiet time after the first line feeds, s: half a line in a drive's buffer is refused meanwhile."""
-NAMED = (2, 3)
+NAMED_ESCAPES = (2, 3)
 """The escape modes in which a stop bears the drive's name (5.1.41)."""
 
 
-def find(state: MCodeState, place: Place) -> Procedure[bool]:
+def find(state: MCodeState, place: ReplyPlace) -> Procedure[bool]:
     """Find a drive at a place, and read what it is and how it is set; False where it is silent."""
     if place.party:
         sure = yield from _answering(state, place)
         if sure is None:
             return False
         place = sure
-    found = yield from look(state, place, identity_asked)
-    if found is None:
+    identified = yield from look(state, place, identity_asked)
+    if identified is None:
         return False
-    form, said = found
+    form, said = identified
     matched = re.fullmatch(identity_asked(form)[1], said)
     assert matched is not None
     values = matched.groupdict()
@@ -284,7 +289,7 @@ def product_of(version: str) -> str:
     return MODULE if head.startswith(MODULE) else head if head.startswith("LM") else MDRIVE
 
 
-def find_in_text(state: MCodeState, place: Place) -> Procedure[bool]:
+def find_in_text(state: MCodeState, place: ReplyPlace) -> Procedure[bool]:
     """Find a drive on a line whose drives may be in party mode or not, after `TEXT` and a line feed.
 
     A drive that is not in party mode collects these lines in its buffer. For it they are a text that is being printed,
@@ -303,7 +308,7 @@ def end_text() -> Procedure[Reply]:
     return (yield Request(NOBODY, 'end of the text "', Kind.QUIET, MCode(), settle=SETTLE, timeout=BRIEF, body=body))
 
 
-def _whispers(place: Place) -> Procedure[bool]:
+def _whispers(place: ReplyPlace) -> Procedure[bool]:
     """Whether a drive prints its name that does not reply to a ping (EM=2)."""
     name = re.escape(as_printed(place.address))
     for checksum in place.checks:
@@ -315,7 +320,7 @@ def _whispers(place: Place) -> Procedure[bool]:
     return False
 
 
-def _answering(state: MCodeState, place: Place) -> Procedure[Place | None]:
+def _answering(state: MCodeState, place: ReplyPlace) -> Procedure[ReplyPlace | None]:
     """Make sure that a drive replies to its name, before it is asked much; None where it is silent.
 
     A drive that is not in party mode keeps every line in its buffer, and a full buffer is an error.
@@ -323,8 +328,8 @@ def _answering(state: MCodeState, place: Place) -> Procedure[Place | None]:
     place, replied = yield from pinged(state, place)
     if replied:
         return place
-    found = yield from look(state, place, lambda form: ("ES", "[0-3]"))
-    return None if found is None else replace(place, checks=(found[0].checksum,))
+    answered = yield from look(state, place, lambda form: ("ES", "[0-3]"))
+    return None if answered is None else replace(place, checks=(answered[0].checksum,))
 
 
 def identity_asked(form: MCode) -> tuple[str, str]:
@@ -339,7 +344,7 @@ def identity_asked(form: MCode) -> tuple[str, str]:
     return (f"{items},CK", f"{pattern}(?P<checksum>[12])") if form.checksum else (items, pattern)
 
 
-def pinged(state: MCodeState, place: Place) -> Procedure[tuple[Place, bool]]:
+def pinged(state: MCodeState, place: ReplyPlace) -> Procedure[tuple[ReplyPlace, bool]]:
     """Ping a drive: its reply shows whether it wants a checksum, and whether it is in program mode.
 
     Return the place with what is certain of its checksum, and whether a drive replied. With EM=2 none would.
@@ -366,12 +371,12 @@ def _name_and_serial(state: MCodeState) -> Procedure[None]:
         items, pattern = '"<",DN,">"', f"<{NAME}>"
     for _ in range(THRICE):
         said, _reply = yield from asked(state, state.address, state.codec, items, pattern)
-        if said and (found := re.fullmatch(pattern, said)):
-            values = found.groupdict()
+        if said and (match := re.fullmatch(pattern, said)):
+            values = match.groupdict()
             _record(state, values.get("name", ""), values.get("serial", ""))
             return
         state.error_possible()  # the drive refused the question, or noise made one of it that it refuses
-    if state.codec.escape in NAMED:
+    if state.codec.escape in NAMED_ESCAPES:
         state.note(
             f"{who(state)}: its name could not be read, and a stop with ES={state.codec.escape} needs it; open it again"
         )

@@ -22,7 +22,7 @@ from multidrop.families.lexium.manual.table import lookup
 def known_words(product: str, words: Sequence[str]) -> list[str]:
     """Those of the words that a product has; of an unknown product, those that every Lexium has."""
     rows = [(word, lookup(word, product if product in EVERY else "")) for word in words]
-    every = EVERY - frozenset(each for each in EVERY if not each.startswith("LM"))
+    every = EVERY - frozenset(personality for personality in EVERY if not personality.startswith("LM"))
     return [
         word
         for word, row in rows
@@ -47,10 +47,10 @@ class MCodeMotions(LexiumMotions):
         form = "".join("([01])" if word in FLAGS else f"({INTEGER}) " for word in asked).rstrip()
         printed = re.fullmatch(form, (yield from value_of(state, items, re.sub(r"[()]", "", form))))
         assert printed is not None
-        found = dict(zip(asked, map(int, printed.groups()), strict=True))
-        if "BY" in found and "EF" in found:
-            state.program_read(error=bool(found["EF"]), running=bool(found["BY"]))
-        return found
+        readings = dict(zip(asked, map(int, printed.groups()), strict=True))
+        if "BY" in readings and "EF" in readings:
+            state.program_read(error=bool(readings["EF"]), running=bool(readings["BY"]))
+        return readings
 
     def error(self) -> Procedure[int | None]:
         return exchange.read_error(self.state)
@@ -72,7 +72,7 @@ class MCodeMotions(LexiumMotions):
         if "IS" in parameters.lists(state.product, state.version):
             return starts_program((yield from listed(state, "PR IS")))
         for word in known_words(state.product, POINTS):
-            printed = yield from value_of(state, word, parameters.Form.FIELDS.value)
+            printed = yield from value_of(state, word, parameters.SettingForm.FIELDS.value)
             if printed.partition(",")[0].strip() == str(GO):
                 return True
         return False

@@ -20,10 +20,10 @@ from multidrop.families.lexium.host.mcode import exchange
 from multidrop.families.lexium.host.mcode.before_request import before_request, find_again, first_print, value_of
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE, MCode
 from multidrop.families.lexium.host.mcode.identity import find, set_wire
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, refuse_in_program
+from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace, refuse_in_program
 from multidrop.families.lexium.host.operations import LexiumOperations
 from multidrop.families.lexium.manual import grammar
-from multidrop.families.lexium.manual.grammar import Number, Unary, parsed
+from multidrop.families.lexium.manual.grammar import Number, UnaryTerm, parsed
 from multidrop.families.lexium.manual.groups import READ_BACK
 from multidrop.families.lexium.manual.mnemonic import EXPANDED
 from multidrop.families.lexium.manual.points import EXPANDED_INPUTS, INPUTS, STATUS, in_words
@@ -75,7 +75,7 @@ def echo_everything(state: MCodeState) -> Procedure[None]:
     A drive that was silent at the opening is identified first: nobody restores an unknown one.
     """
     if not state.product:
-        place = Place(state.codec.party, state.address, (int(state.codec.checksum > 0),))
+        place = ReplyPlace(state.codec.party, state.address, (int(state.codec.checksum > 0),))
         if not (yield from find(state, place)):
             raise NoAnswer(f"{who(state)} does not reply: 'EM=0' was not sent")
     if not state.serial:
@@ -134,10 +134,10 @@ def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
     alike = [each for each in owed if each.like(state)]
     if not alike or state.settings_unknown:
         return
-    if any(each.serial for each in alike):
+    if any(record.serial for record in alike):
         state.serial_read((yield from serial_number(state)))
     yield from repaired(state, owed, MCodeOperations(state).perform)
-    mine = next((each for each in alike if each.serial == state.serial and not each.lines), None)
+    mine = next((record for record in alike if record.serial == state.serial and not record.lines), None)
     if mine is None or state.codec.em != 0:  # another host has set it since
         return
     state.owes(mine)
@@ -227,12 +227,12 @@ def confirm_effect(state: MCodeState, request: Request, before: list[int]) -> Pr
     """
     if (setting := written(request.text)) is not None:
         word, number = setting
-        found = yield from _numbers(state, f'{word}," ",BY', f"{INTEGER} [01]")
-        if found and abs(found[0] - number) <= READ_BACK[word]:
+        numbers = yield from _numbers(state, f'{word}," ",BY', f"{INTEGER} [01]")
+        if numbers and abs(numbers[0] - number) <= READ_BACK[word]:
             return
-        if found and not found[1]:  # a running program may have written another number meanwhile
+        if numbers and not numbers[1]:  # a running program may have written another number meanwhile
             fate = "it is not known whether it was executed; it was sent once"
-            raise NoAnswer(f"{who(state)}: {word} reads {found[0]} after '{request.text}': {fate}")
+            raise NoAnswer(f"{who(state)}: {word} reads {numbers[0]} after '{request.text}': {fate}")
     elif before[:2] == [0, 0]:  # at rest: nothing that happens next happens by itself
         after = yield from _numbers(state, *ACTIVITY)
         if after and after != before:
@@ -247,7 +247,7 @@ def written(text: str) -> tuple[str, int] | None:
         return None
     [argument] = statement.arguments
     sign = 1
-    if isinstance(argument, Unary) and argument.op == "-":
+    if isinstance(argument, UnaryTerm) and argument.op == "-":
         sign, argument = -1, argument.operand
     row = lookup(statement.word)
     if row is None or row.name not in READ_BACK or not isinstance(argument, Number) or argument.value % 1:
@@ -263,7 +263,7 @@ def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
     if not reply.lines:
         state.reply_lost()
         return []
-    return [int(each) for each in exchange.value(state, reply).split()]
+    return [int(number) for number in exchange.value(state, reply).split()]
 
 
 # Typed lines, lists, motion, flags. `exchange` has the single request.
@@ -390,9 +390,9 @@ class MCodeOperations(LexiumOperations):
         request = _motion(state.codec, state.address, exchange.sign(state), priority)
         reply = yield from exchange.once(state, request)
         exchange.check_printed(state, reply)
-        found = re.fullmatch(request.expect or "", reply.text)
-        assert found is not None
-        return (Motion(int(found[2]), int(found[3]), program=found[1] == "1" if found[1] else None),)
+        match = re.fullmatch(request.expect or "", reply.text)
+        assert match is not None
+        return (Motion(int(match[2]), int(match[3]), program=match[1] == "1" if match[1] else None),)
 
     def status(self) -> Procedure[tuple[str, ...]]:
         """Describe motion, program, error and inputs from one print; nothing is cleared.
@@ -404,8 +404,8 @@ class MCodeOperations(LexiumOperations):
             return ("program mode: lines are stored, not executed; PG ends it",)
         asked = '" ",'.join(f"{word}," for word in STATUS).rstrip(",")
         pattern = " ".join((INTEGER, INTEGER, "[01]", "[01]", "[01]", r"\d{1,4}"))
-        found = (yield from value_of(state, asked, pattern)).split()
-        position, velocity, moving, busy, error, inputs = map(int, found)
+        flags = (yield from value_of(state, asked, pattern)).split()
+        position, velocity, moving, busy, error, inputs = map(int, flags)
         state.error_flag_read(error == 1)
         points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
         return in_words(position, velocity, moving, busy, error, inputs, points=points)

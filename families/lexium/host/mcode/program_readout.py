@@ -22,7 +22,7 @@ from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.settings import listed
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import editing, help, program_file
-from multidrop.families.lexium.manual.grammar import Compare, Name, parsed
+from multidrop.families.lexium.manual.grammar import Compare, NameTerm, parsed
 from multidrop.families.lexium.manual.groups import LAST_LINES
 from multidrop.families.lexium.manual.statements import size_of
 
@@ -35,7 +35,7 @@ from multidrop.families.lexium.manual.statements import size_of
 # large gap.
 
 
-GAP = 64
+LONGEST_LINE_BYTES = 64
 """Bytes between the addresses of two lines, more than one line takes: another program begins."""
 GLOBAL, LOCAL, LABEL = "G", "L", "label"
 """Kinds of names in a drive: a variable of the two scopes that PR UV prints, or a label of the program."""
@@ -52,7 +52,7 @@ class Called:
 
 
 @dataclass(frozen=True)
-class Program:
+class ReadProgram:
     """A program in a drive: its lines, and the address after the last one."""
 
     lines: tuple[Stored, ...]
@@ -63,8 +63,8 @@ class Program:
         return self.lines[0].at
 
     def declared(self, word: str) -> set[str]:
-        found = [declared(line.text) for line in self.lines]
-        return {each[1] for each in found if each is not None and each[0] == word}
+        declarations = [declared(line.text) for line in self.lines]
+        return {declaration[1] for declaration in declarations if declaration is not None and declaration[0] == word}
 
 
 @dataclass(frozen=True)
@@ -84,27 +84,30 @@ class FileProgram:
 
 
 def stored(listed: Sequence[str]) -> tuple[Stored, ...]:
-    found = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
-    return tuple(Stored(int(row[1]), row[2]) for row in found)
+    rows = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
+    return tuple(Stored(int(row[1]), row[2]) for row in rows)
 
 
 def names_of(held: Held) -> dict[str, Called]:
-    found = [row for line in held.names if (row := _NAMED.fullmatch(line.strip()))]
-    return {row[1].upper(): Called(row[2] or LABEL, row[3]) for row in found}
+    rows = [row for line in held.names if (row := _NAMED.fullmatch(line.strip()))]
+    return {row[1].upper(): Called(row[2] or LABEL, row[3]) for row in rows}
 
 
-def programs(lines: Sequence[Stored], product: str = "", fine: bool = False) -> list[Program]:
+def programs(lines: Sequence[Stored], product: str = "", fine: bool = False) -> list[ReadProgram]:
     """Divide a listing into programs; `fine`: at every gap."""
-    found: list[list[Stored]] = []
+    programs: list[list[Stored]] = []
     end = -1
     for line in lines:
-        before = found[-1][-1] if found else None
+        before = programs[-1][-1] if programs else None
         ends = before is not None and (fine or classify.word_of(before.text)[0] in LAST_LINES)
-        if before is None or line.at - before.at > GAP or (line.at > end and ends):
-            found.append([])
-        found[-1].append(line)
+        if before is None or line.at - before.at > LONGEST_LINE_BYTES or (line.at > end and ends):
+            programs.append([])
+        programs[-1].append(line)
         end = line.at + size(line.text, product)
-    return [Program(tuple(each), each[-1].at + size(each[-1].text, product)) for each in found]
+    return [
+        ReadProgram(tuple(program_lines), program_lines[-1].at + size(program_lines[-1].text, product))
+        for program_lines in programs
+    ]
 
 
 @lru_cache(maxsize=4096)
@@ -153,7 +156,7 @@ def declared(text: str) -> tuple[str, str] | None:
     first = statement.arguments[0]
     if isinstance(first, Compare):
         first = first.left
-    return (statement.word, first.word) if isinstance(first, Name) else None
+    return (statement.word, first.word) if isinstance(first, NameTerm) else None
 
 
 # Reading the programs of an MCode drive, with its labels and variables, and ending them.
@@ -202,7 +205,7 @@ class MCodeReadout(Programs, ABC):
         listed = () if locked else (yield from _again(state, lambda: MCodeOperations(state).listing("")))
         names = yield from _again(state, lambda: MCodeOperations(state).perform("PR UV"))
         held = Held(stored(listed), tuple(name.strip() for name in names if name.strip()), locked)
-        labels = any(each.kind == LABEL for each in names_of(held).values())
+        labels = any(called.kind == LABEL for called in names_of(held).values())
         if labels and not (held.lines or locked):  # the L was lost on the line
             held = replace(held, lines=stored((yield from _again(state, lambda: MCodeOperations(state).listing("")))))
         return held
@@ -237,10 +240,10 @@ class MCodeReadout(Programs, ABC):
 
     def start(self, lines: Sequence[SourceLine], label: str) -> str:
         """Return the line that executes a program of a file. Raises Diagnostic where the file has no such label."""
-        found = programs_of(lines)
-        inside = [declared(line.text) for program in found for line in program.lines]
+        programs = programs_of(lines)
+        inside = [declared(line.text) for program in programs for line in program.lines]
         labels = [name for word, name in filter(None, inside) if word == "LB"]
-        if label.upper() not in (*labels, *(program.place for program in found)):
+        if label.upper() not in (*labels, *(program.place for program in programs)):
             hint = f"labels: {', '.join(labels)}" if labels else "the file has no labels"
             raise Diagnostic(f"no label {label} in the file", "", hint)
         return f"EX {label.upper()}"
@@ -253,10 +256,10 @@ class MCodeReadout(Programs, ABC):
         for line, sent in _sent_lines(text):
             if sent is not None and sent.section == "program":
                 at = len(made) if at is None else at
-            elif sent is not None and (found := declared(sent.text)) is not None and found[1] in missing:
-                value = missing.pop(found[1])
+            elif sent is not None and (declaration := declared(sent.text)) is not None and declaration[1] in missing:
+                value = missing.pop(declaration[1])
                 if (sent.text.partition("=")[2].strip() or "0") != value:
-                    line = line.replace(sent.text, f"VA {found[1]}={value}", 1)
+                    line = line.replace(sent.text, f"VA {declaration[1]}={value}", 1)
             made.append(line)
         more = [f"VA {name}={value}" for name, value in missing.items()]
         return (*made[:at], *more, *made[at:]) if at is not None else (*made, *more)

@@ -22,7 +22,16 @@ from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.program_readout import FileProgram
 from multidrop.families.lexium.host.mcode.state import MCodeState
 from multidrop.families.lexium.manual import guards
-from multidrop.families.lexium.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
+from multidrop.families.lexium.manual.grammar import (
+    Argument,
+    Compare,
+    LineError,
+    NameTerm,
+    Number,
+    Statement,
+    UnaryTerm,
+    parse,
+)
 from multidrop.families.lexium.manual.mnemonic import ETHERNET, EXPANDED
 from multidrop.families.lexium.manual.statements import canonical
 from multidrop.families.lexium.manual.table import lookup
@@ -112,9 +121,9 @@ def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
 def _values(state: MCodeState, statement: Statement) -> Procedure[list[float | None]]:
     """Return the values that a setting gets; of another word (`D=A`) its present value."""
     match statement.arguments:
-        case (Name(word),) if (row := lookup(word, state.product)) is not None and row.kind in HOLDING:
+        case (NameTerm(word),) if (row := lookup(word, state.product)) is not None and row.kind in HOLDING:
             return (yield from _read_setting(state, word, []))
-    return [_literal(each) for each in statement.arguments]
+    return [_literal(argument) for argument in statement.arguments]
 
 
 def _literal(argument: Argument | None) -> float | None:
@@ -122,7 +131,7 @@ def _literal(argument: Argument | None) -> float | None:
     match argument:
         case Number(value):
             return float(value)
-        case Unary("-", Number(value)):
+        case UnaryTerm("-", Number(value)):
             return -float(value)
     return None
 
@@ -130,7 +139,7 @@ def _literal(argument: Argument | None) -> float | None:
 def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) -> Procedure[list[float | None]]:
     """Read the present values of a setting; of a setting with several rows the row that begins alike."""
     printed = yield from MCodeOperations(state).immediate(state.codec.request(state.address, f"PR {name}"))
-    rows = [[real(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
+    rows = [[real(number) for number in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
     if len(rows) == 1:
         return rows[0]
     return next((row for row in rows if row[:1] == list(values[:1])), [])
@@ -152,16 +161,23 @@ class MCodePrograms(MCodeDownload):
         `before`: what the drive held before the file was sent. A line of that after a program is another program's.
         """
         names = program_readout.names_of(held)
-        found = program_readout.programs_of(lines)
-        starts = {start for each in found if (start := each.start(names)) is not None}
-        known = {*names, *(each[1] for line in lines if (each := program_readout.declared(line.text)) is not None)}
+        programs = program_readout.programs_of(lines)
+        starts = {start for stored_program in programs if (start := stored_program.start(names)) is not None}
+        known = {
+            *names,
+            *(declaration[1] for line in lines if (declaration := program_readout.declared(line.text)) is not None),
+        }
         made: list[Difference] = []
-        for program in found:
+        for program in programs:
             start = program.start(names)
             own = program if start is None else _not_replaced(program, start, starts, self.state.product)
             made += _compared(own.lines, _there(own, start, starts, held, self.state.product), known)
         old = set(before.lines) if before is not None else set()
-        return tuple(each for each in made if each.number or (each.at, each.there) not in old)
+        return tuple(
+            stored_program
+            for stored_program in made
+            if stored_program.number or (stored_program.at, stored_program.there) not in old
+        )
 
     def to_send(self, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
         """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
@@ -199,15 +215,15 @@ class MCodeCertifying(Certifying):
     def traits(self) -> set[str]:
         """The firmware, the port, and how the drive is set, as far as questions depend on it."""
         state = self.state
-        found = {
+        traits = {
             "mdrive" if state.product in EXPANDED | {"MDI", "MDIE"} else "lexium",
             "ethernet" if ETHERNET.match(state.product) else "serial",
         }
-        found |= {"base"} if state.product == "MDI" else set()
-        found |= (
+        traits |= {"base"} if state.product == "MDI" else set()
+        traits |= (
             {"hmt"} if (row := lookup("AF", state.product)) is not None and state.product in row.products else set()
         )
-        return found | {"party" if state.codec.party else "alone"}
+        return traits | {"party" if state.codec.party else "alone"}
 
     def occupied(self) -> Procedure[Occupied]:
         """Find out whether a program is stored. Raises Refused where an error stands."""

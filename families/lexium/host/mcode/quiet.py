@@ -24,8 +24,8 @@ from multidrop.families.lexium.manual.groups import SLOW
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
-FIRST, BETWEEN = 0.4, 0.06
-SLOWEST = 90.0
+SHORTEST_REQUEST_TIME, BETWEEN = 0.4, 0.06
+SLOWEST_BYTES_A_SECOND = 90.0
 """Characters a second on a line of 1200 baud after a gateway, where the host does not know the baud rate."""
 PONG = 0.15
 """The time without a reply to a ping, which EM=2 does not give."""
@@ -141,12 +141,12 @@ class Received:
         if not (request.signed and request.expect) or buffer[-1:] not in (b"\n", b">", b"?"):
             return False
         text = buffer.decode("latin-1")
-        found = list(re.finditer(rf"(?:{request.expect})(.?)\r?\n", text))
-        if not found:
+        matches = list(re.finditer(rf"(?:{request.expect})(.?)\r?\n", text))
+        if not matches:
             return False
-        before, after = text[: found[-1].start()], text[found[-1].end() :]
+        before, after = text[: matches[-1].start()], text[matches[-1].end() :]
         if self.checksum and not (
-            _ACK in before and framing.unsealed(found[-1][0].rstrip("\r\n").encode("latin-1")) is not None
+            _ACK in before and framing.unsealed(matches[-1][0].rstrip("\r\n").encode("latin-1")) is not None
         ):
             return False  # an ACK may follow the print
         return after in _PROMPTS if "PR " in before else not after
@@ -164,15 +164,15 @@ class Received:
         """Whether the whole reply to a ping has come."""
         request = self.request
         pinged = bool(request.address) and not (request.body or request.text)
-        return pinged and any(self.buffer in pongs(request.address, each) for each in (False, True))
+        return pinged and any(self.buffer in pongs(request.address, checksum) for checksum in (False, True))
 
     @property
     def sending_time(self) -> float:
         """The seconds that the request takes on the slowest line, at least FIRST."""
-        return max(FIRST, len(self.request.text) / SLOWEST)
+        return max(SHORTEST_REQUEST_TIME, len(self.request.text) / SLOWEST_BYTES_A_SECOND)
 
 
-class Row(NamedTuple):
+class QuietRow(NamedTuple):
     """The seconds of quiet that end a reply, if what was received is as `applies` says."""
 
     applies: Callable[[Received], bool]
@@ -184,47 +184,47 @@ def _always(received: Received) -> bool:
 
 
 COLLECTION = (
-    Row(lambda it: it.is_whole, AT_ONCE),
-    Row(lambda it: it.has_expected_line, SHORT),
-    Row(lambda it: it.expected is not None, BETWEEN),
-    Row(lambda it: it.is_pong, AT_ONCE),
-    Row(lambda it: bool(it.buffer), BETWEEN),
-    Row(lambda it: bool(it.request.text), lambda it: it.sending_time),
-    Row(_always, PONG),
+    QuietRow(lambda it: it.is_whole, AT_ONCE),
+    QuietRow(lambda it: it.has_expected_line, SHORT),
+    QuietRow(lambda it: it.expected is not None, BETWEEN),
+    QuietRow(lambda it: it.is_pong, AT_ONCE),
+    QuietRow(lambda it: bool(it.buffer), BETWEEN),
+    QuietRow(lambda it: bool(it.request.text), lambda it: it.sending_time),
+    QuietRow(_always, PONG),
 )
 LIST = (
-    Row(lambda it: it.em == 0, LIST_QUIET),  # its prompt ends it
-    Row(lambda it: it.is_listing and it.ends_in_last_line, SHORT),
-    Row(lambda it: not it.is_listing and it.ends_in_empty_line, EXECUTED),
-    Row(_always, LIST_QUIET),
+    QuietRow(lambda it: it.em == 0, LIST_QUIET),  # its prompt ends it
+    QuietRow(lambda it: it.is_listing and it.ends_in_last_line, SHORT),
+    QuietRow(lambda it: not it.is_listing and it.ends_in_empty_line, EXECUTED),
+    QuietRow(_always, LIST_QUIET),
 )
 _SIGNS = (
-    Row(lambda it: it.may_be_refused, SHORT),
-    Row(lambda it: it.has_nak, PATIENT),
+    QuietRow(lambda it: it.may_be_refused, SHORT),
+    QuietRow(lambda it: it.has_nak, PATIENT),
 )
-SILENT = (
+SILENT_ROWS = (
     *_SIGNS,
-    Row(lambda it: it.is_slow, FLASH),
-    Row(lambda it: it.em == 2, SHORT),
-    Row(_always, PATIENT),
+    QuietRow(lambda it: it.is_slow, FLASH),
+    QuietRow(lambda it: it.em == 2, SHORT),
+    QuietRow(_always, PATIENT),
 )
 """Commands and program lines, which print no line."""
 ECHO_MODE = (  # the next question shows the mode and ignores what is left of this reply
     *_SIGNS,
-    Row(lambda it: it.em == 2 and not it.buffer, EXECUTING),
-    Row(lambda it: not it.is_executed, PATIENT),
-    Row(lambda it: it.buffer[-1:] == b">", AT_ONCE),
-    Row(_always, EXECUTED),
+    QuietRow(lambda it: it.em == 2 and not it.buffer, EXECUTING),
+    QuietRow(lambda it: not it.is_executed, PATIENT),
+    QuietRow(lambda it: it.buffer[-1:] == b">", AT_ONCE),
+    QuietRow(_always, EXECUTED),
 )
 """`EM=`."""
 OTHERS = (
     *_SIGNS,
-    Row(lambda it: it.checksum == 2 and it.buffer[-1:] == b"\n", SHORT),
-    Row(_always, PATIENT),
+    QuietRow(lambda it: it.checksum == 2 and it.buffer[-1:] == b"\n", SHORT),
+    QuietRow(_always, PATIENT),
 )
-BY_KIND: Mapping[Kind, Sequence[Row]] = {
+BY_KIND: Mapping[Kind, Sequence[QuietRow]] = {
     Kind.QUIET: COLLECTION,
     Kind.LIST: LIST,
-    Kind.COMMAND: SILENT,
-    Kind.PROGRAM: SILENT,
+    Kind.COMMAND: SILENT_ROWS,
+    Kind.PROGRAM: SILENT_ROWS,
 }

@@ -10,7 +10,7 @@ from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.framing import (
     SIGN_ON,
     UNPRINTED,
-    Piece,
+    ReplyPiece,
     checksum,
     printable,
     stripped,
@@ -79,7 +79,7 @@ class ReplyLines:
         else:
             self.strays.append(line)
 
-    def add_glued(self, piece: Piece) -> None:
+    def add_glued(self, piece: ReplyPiece) -> None:
         """Sort text before an ACK or NAK: EM=3's repetition of the request, or an incomplete line."""
         if self.echo == 3 and not self.repeated and self.repetition(piece.shown) == len(piece.shown):
             self.repeated = True
@@ -113,12 +113,12 @@ class ReplyLines:
             self.repeated, data = True, plain[size:]
             if not data:
                 return
-        found = unsealed(data) if self.sealed else stripped(data)
-        if found is None:
+        unsealed_text = unsealed(data) if self.sealed else stripped(data)
+        if unsealed_text is None:
             self.damaged = f"checksum of {printable(data)!r} is wrong"
             self.collided.append(printable(data))
             return
-        self._sort(printable(found))
+        self._sort(printable(unsealed_text))
 
     def add_unended(self, data: bytes) -> None:
         """Add a print that ends in a semicolon: it has neither line end nor check byte."""
@@ -136,7 +136,7 @@ class ReplyLines:
         text = (self.request.spoken or self.request.text).encode("latin-1")
         whole = [words + self.check_byte(frame) for words in (self.frame, text) for frame in (self.frame, text)]
         if self.sealed:
-            return next((len(each) for each in whole if data.startswith(each)), 0)
+            return next((len(line) for line in whole if data.startswith(line)), 0)
         return len(data) if data in whole else 0
 
     def _sort(self, line: str) -> None:
@@ -210,7 +210,7 @@ class ReplyLines:
             self.damaged,
             flagged=flagged,
             surplus=surplus,
-            collided=tuple(each for each in (*self.collided, *pieces) if each.strip(">?")),  # a prompt is no print
+            collided=tuple(piece for piece in (*self.collided, *pieces) if piece.strip(">?")),  # a prompt is no print
         )
         return Decoded(reply, used, strays)
 

@@ -6,7 +6,14 @@ from dataclasses import replace
 
 from multidrop.dialects.codec import Decoded, End, Kind, Request
 from multidrop.families.lexium.host import classify
-from multidrop.families.lexium.host.mcode.framing import ADDRESS_PROMPT, Piece, after_echo, pieces, printable, unsealed
+from multidrop.families.lexium.host.mcode.framing import (
+    ADDRESS_PROMPT,
+    ReplyPiece,
+    after_echo,
+    pieces,
+    printable,
+    unsealed,
+)
 from multidrop.families.lexium.host.mcode.reply_lines import ENDLESS, ReplyLines
 
 # Theory of operation. A reply depends on three settings: the echo mode EM, party mode PY and the checksum mode CK
@@ -52,10 +59,10 @@ class ReplyParser:
     def whole(self) -> Decoded | None:
         start = 0
         if self.echo == 0 and self.request.kind is not Kind.QUIET:
-            found = after_echo(self.frame, self.got.check_byte(self.frame), self.buffer)
-            if found is None:
+            rest = after_echo(self.frame, self.got.check_byte(self.frame), self.buffer)
+            if rest is None:
                 return None
-            start, between = found
+            start, between = rest
             for line in between.splitlines():
                 if line := line.lstrip(b">"):
                     self.got.add_earlier(line)
@@ -65,7 +72,7 @@ class ReplyParser:
                 return done
         return None
 
-    def _take(self, piece: Piece) -> Decoded | None:
+    def _take(self, piece: ReplyPiece) -> Decoded | None:
         if piece.what == "nak":
             self.got.naks += 1
         elif piece.what == "ack":
@@ -123,13 +130,13 @@ class ReplyParser:
         """Whether a possible `?` prompt precedes: then a `>` may be the first character of a print."""
         return self.candidate is not None and self.candidate[0] == b"?"
 
-    def _prompt_before(self, piece: Piece) -> bytes | None:
+    def _prompt_before(self, piece: ReplyPiece) -> bytes | None:
         """Return the prompt at the head of a line whose rest is not a print: the name at the end of a move."""
         kind, data = self.request.kind, piece.shown
         if not self._at_end or (kind is Kind.PRINT and not self.got.answered):
             return None
-        if kind is Kind.PROGRAM and (found := ADDRESS_PROMPT.match(data)):
-            return found.group()
+        if kind is Kind.PROGRAM and (match := ADDRESS_PROMPT.match(data)):
+            return match.group()
         if data[:1] not in PROMPTS:
             return None
         if data[:1] == b">" and len(data) == 2:
@@ -158,8 +165,8 @@ class ReplyParser:
             return None
         prompt, start, before, self.got.damaged = self.candidate
         del self.got.strays[before:]
-        found = self._at_prompt(prompt, start)
-        return found if prompt == b"?" else self._unacknowledged(found)
+        decoded = self._at_prompt(prompt, start)
+        return decoded if prompt == b"?" else self._unacknowledged(decoded)
 
     def _unacknowledged(self, found: Decoded) -> Decoded:
         return replace(found, reply=replace(found.reply, prompt="", acknowledged=self.got.acks > 0))
@@ -257,8 +264,8 @@ class ReplyParser:
     def _settled_prompt(self, used: int) -> Decoded | None:
         """Decide with EM=0 between a prompt, a print that looks like one, and a print without a line end."""
         if self._is_prompt(self.rest):
-            found = self._at_prompt(self.rest, used - len(self.rest))
-            return self._unacknowledged(found) if self._refused_before else found
+            decoded = self._at_prompt(self.rest, used - len(self.rest))
+            return self._unacknowledged(decoded) if self._refused_before else decoded
         if self.request.kind is Kind.PRINT and self.rest[-1:] in PROMPTS and not self.got.naks:
             self.got.add_unended(self.rest[:-1])
             return self.got.decoded(End.DONE, used, printable(self.rest[-1:]))

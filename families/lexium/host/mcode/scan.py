@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects.codec import Kind, Procedure, Request
-from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
+from multidrop.dialects.scanning import Found, Reach, Scan, SearchOutcome, Step
 from multidrop.families.lexium.host.mcode.codec import NOBODY, MCode
 from multidrop.families.lexium.host.mcode.framing import NAK, sealed
 from multidrop.families.lexium.host.mcode.identity import BRIEF, PROGRAM_PROMPT, find, overflow, write_stop
 from multidrop.families.lexium.host.mcode.quiet import pongs
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place
+from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace
 from multidrop.families.lexium.manual.statements import NAMES
 
 # What frees an MCode drive that does not reply, whatever it is set to; nothing here knows the drive.
@@ -32,7 +32,7 @@ CLEARS = (
     "stops every drive and its program, makes half a line in a drive overflow (error 20) and sends PG, an error "
     "outside of program mode; an OE subroutine that an error starts is stopped. It erases nothing"
 )
-APART = 0.02
+PART_PAUSE = 0.02
 """Quiet time after each part, s: a drive may reply to it."""
 RESTARTING = 1.0
 """The time that a drive takes for FD, s."""
@@ -71,11 +71,11 @@ CERTAIN = 5
 """Windows in which a late reply comes: for a question that is repeated because something came."""
 ALONE_TRIES = 4
 """Questions to a drive outside of party mode: the first one may follow half a line, and each may want a checksum."""
-REST = 3
+REST_WINDOWS = 3
 """Windows in which the replies to earlier questions come."""
-LATE = 6
+LATE_NAMES = 6
 """Names before the present one whose reply may come now: an adapter holds bytes for 16 ms, a network for longer."""
-NAMED_PONGS = {name: [each for sign in (True, False) for each in pongs(name, sign) if len(each) > 2] for name in NAMES}
+NAMED_PONGS = {name: [pong for sign in (True, False) for pong in pongs(name, sign) if len(pong) > 2] for name in NAMES}
 """The replies to a ping that bear the name."""
 ROUNDS = 3
 """Pings, prints, prints with a checksum."""
@@ -101,7 +101,7 @@ class Apart(MCode):
 
 
 @dataclass
-class _Search:
+class _McodeSearch:
     """One search: its manner, what it has found, and what it could not read."""
 
     reach: Reach
@@ -129,7 +129,7 @@ class _Search:
 # A drive outside of party mode
 
 
-def _unnamed(own: _Search) -> Procedure[bool]:
+def _unnamed(own: _McodeSearch) -> Procedure[bool]:
     """Look for a drive outside of party mode; return whether one replies."""
     checksum, tried = 0, 0
     for _ in range(ALONE_TRIES):
@@ -140,7 +140,7 @@ def _unnamed(own: _Search) -> Procedure[bool]:
         if not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard)):
             heard = yield from _parts_asked(own, question, CERTAIN * own.reach.window)
         if _is_unnamed(question, heard):
-            state = yield from _identified(own, Place(False, ""))
+            state = yield from _identified(own, ReplyPlace(False, ""))
             if state is not None:
                 own.found(state)
             return True
@@ -152,7 +152,7 @@ def _unnamed(own: _Search) -> Procedure[bool]:
     return False
 
 
-def _parts_asked(own: _Search, question: list[bytes], quiet: float) -> Procedure[list[bytes]]:
+def _parts_asked(own: _McodeSearch, question: list[bytes], quiet: float) -> Procedure[list[bytes]]:
     heard = []
     for part in question:
         heard.append((yield from own.asked(part, QUESTION.decode(), quiet)))
@@ -177,7 +177,7 @@ def _ambiguous(heard: bytes) -> bool:
 # Names
 
 
-def _named(own: _Search) -> Procedure[None]:
+def _named(own: _McodeSearch) -> Procedure[None]:
     """Try every name: pings first, then prints for the drives that do not reply to a ping."""
     for number in range(ROUNDS):
         for at, name in enumerate(NAMES):
@@ -186,7 +186,7 @@ def _named(own: _Search) -> Procedure[None]:
                 return
             if name not in own.names and not (own.talks and number == 0):
                 # Try the last of these names in one form; the names before it may reply late.
-                names = NAMES[max(0, at - LATE) : at + 1]
+                names = NAMES[max(0, at - LATE_NAMES) : at + 1]
                 name = names[-1]
                 if number == 0:
                     heard = yield from _pinged(own, name, PING * own.reach.window)
@@ -197,32 +197,32 @@ def _named(own: _Search) -> Procedure[None]:
                 if heard and not (sure and (yield from _reported(own, name, _checks(name, heard)))) and not own.talks:
                     yield from _late(own, names)
             own.step()
-        if (yield from own.asked(b"\n", "", REST * own.reach.window, NAMES[-1])) and not own.talks:
-            yield from _late(own, NAMES[-LATE:])
+        if (yield from own.asked(b"\n", "", REST_WINDOWS * own.reach.window, NAMES[-1])) and not own.talks:
+            yield from _late(own, NAMES[-LATE_NAMES:])
 
 
-def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
+def _late(own: _McodeSearch, names: Sequence[str]) -> Procedure[None]:
     """Look for the drives whose replies came: the last of these names, or those before it."""
-    several = yield from own.asked(b"\n", "", REST * own.reach.window, names[-1])
-    found = False
+    several = yield from own.asked(b"\n", "", REST_WINDOWS * own.reach.window, names[-1])
+    heard = False
     for there in (_pongs_late, _prints_late):
-        for each in reversed(names):
-            if each not in own.names and (yield from there(own, each)) and (yield from _reported(own, each)):
-                found = True
+        for name in reversed(names):
+            if name not in own.names and (yield from there(own, name)) and (yield from _reported(own, name)):
+                heard = True
                 if not several:
                     return
-        if found:
+        if heard:
             return
     own.talk += 1
 
 
-def _pongs_late(own: _Search, name: str) -> Procedure[bool]:
+def _pongs_late(own: _McodeSearch, name: str) -> Procedure[bool]:
     """Whether a drive replies to a ping of this name, with time for its reply."""
     heard = yield from _pinged(own, name, CERTAIN * own.reach.window)
     return heard in (*pongs(name, True), *pongs(name, False)) or PROGRAM_PROMPT.search(heard) is not None
 
 
-def _prints_late(own: _Search, name: str) -> Procedure[bool]:
+def _prints_late(own: _McodeSearch, name: str) -> Procedure[bool]:
     """Whether a drive prints this name, with time for its reply; what a program prints is not such a reply."""
     for checksum in (0, 1):
         if _prints(name, (yield from _name_asked(own, name, checksum, CERTAIN * own.reach.window))):
@@ -230,11 +230,11 @@ def _prints_late(own: _Search, name: str) -> Procedure[bool]:
     return False
 
 
-def _pinged(own: _Search, name: str, quiet: float) -> Procedure[bytes]:
+def _pinged(own: _McodeSearch, name: str, quiet: float) -> Procedure[bytes]:
     return (yield from own.asked(f"{name}\n".encode(), "", quiet, name))
 
 
-def _name_asked(own: _Search, name: str, checksum: int, quiet: float) -> Procedure[bytes]:
+def _name_asked(own: _McodeSearch, name: str, checksum: int, quiet: float) -> Procedure[bytes]:
     frame = f"{name}PR DN".encode()
     line = (sealed(frame) if checksum else frame) + b"\n"
     return (yield from own.asked(line, "PR DN", quiet, name))
@@ -253,15 +253,15 @@ def _checks(name: str, heard: bytes) -> tuple[int, ...]:
     return (1,) if re.search(sealed_name, heard) else (0, 1)
 
 
-def _reported(own: _Search, name: str, checks: tuple[int, ...] = (0, 1)) -> Procedure[bool]:
-    state = yield from _identified(own, Place(True, name, checks))
+def _reported(own: _McodeSearch, name: str, checks: tuple[int, ...] = (0, 1)) -> Procedure[bool]:
+    state = yield from _identified(own, ReplyPlace(True, name, checks))
     if state is not None:
         own.names.append(name)
         own.found(state)
     return state is not None
 
 
-def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
+def _identified(own: _McodeSearch, place: ReplyPlace) -> Procedure[MCodeState | None]:
     """Identify the drive that replies at a place; a reply that cannot be read becomes a remark."""
     form = Apart if not (place.party or own.reach.alone) else MCode
     state = MCodeState(form(party=place.party), place.address, sync_marks=own.reach.first_mark)
@@ -290,25 +290,25 @@ class MCodeScan(Scan):
     def places(self, reach: Reach) -> int:
         return 1 if reach.alone else 1 + ROUNDS * len(NAMES)
 
-    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[Outcome]:
+    def search(self, reach: Reach, found: Found, step: Step) -> Procedure[SearchOutcome]:
         """Search for every drive at one baud rate; report each as soon as it is identified."""
-        own = _Search(reach, found, step, list(reach.known))
+        own = _McodeSearch(reach, found, step, list(reach.known))
         if reach.cut:
             yield from overflow(NAMES)
         alone = yield from _unnamed(own)
         step()
         if not (alone or reach.alone):
             yield from _named(own)
-        return Outcome(tuple(text for about, text in own.remarks.items() if about not in own.names))
+        return SearchOutcome(tuple(text for about, text in own.remarks.items() if about not in own.names))
 
     def clear(self) -> Procedure[None]:
         """Stop all programs, overflow half lines, leave program mode, and stop what errors started."""
         yield from overflow(NAMES)
         for line in (PG, sealed(PG)):
             for part in (line[:1] + b"\n", line[1:2] + b"\n", line[2:] + b"\r"):
-                yield from _sent(part, APART)
+                yield from _sent(part, PART_PAUSE)
         for line in (EVERYONE, sealed(EVERYONE)):
-            yield from _sent(line + b"\n", APART)
+            yield from _sent(line + b"\n", PART_PAUSE)
         yield from write_stop(MCode(party=True).stop(NAMES, sure=False))
 
     def erase(self) -> Procedure[None]:

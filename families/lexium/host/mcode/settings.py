@@ -37,8 +37,8 @@ from multidrop.families.lexium.host.values import rows_of_list
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual.groups import BANKED, COUNTED, LISTS
 from multidrop.families.lexium.manual.mnemonic import ENCODER, MDRIVE_ENCODER, Mnemonic
-from multidrop.families.lexium.manual.parameters import Form, form_of
-from multidrop.families.lexium.manual.program_file import LONGEST
+from multidrop.families.lexium.manual.parameters import SettingForm, form_of
+from multidrop.families.lexium.manual.program_file import LONGEST_PROGRAM_LINE
 from multidrop.families.lexium.manual.table import words
 
 # Settings, read in few bytes.
@@ -88,8 +88,13 @@ def _batches(state: MCodeState, wanted: Sequence[Mnemonic]) -> Iterator[list[Mne
 
     One whose form is uncertain takes no other with it.
     """
-    mode, plain = state.codec, {Form.DIGIT, Form.WHOLE}
-    room = LONGEST - len(f"PR ,{sign(state).item}") - (len(state.address) if mode.party else 0) - bool(mode.checksum)
+    mode, plain = state.codec, {SettingForm.DIGIT, SettingForm.WHOLE}
+    room = (
+        LONGEST_PROGRAM_LINE
+        - len(f"PR ,{sign(state).item}")
+        - (len(state.address) if mode.party else 0)
+        - bool(mode.checksum)
+    )
     batch: list[Mnemonic] = []
     for row in wanted:
         forms = {form_of(each) for each in (*batch[-1:], row)}
@@ -106,7 +111,7 @@ def items_and_forms(batch: Sequence[Mnemonic]) -> tuple[str, list[str]]:
     items, forms = "", list[str]()
     for before, row in zip([None, *batch], batch, strict=False):
         form = form_of(row)
-        alone = before is None or (form_of(before) is Form.DIGIT and form is Form.DIGIT)
+        alone = before is None or (form_of(before) is SettingForm.DIGIT and form is SettingForm.DIGIT)
         items += ("" if before is None else "," if alone else f',"{BETWEEN}",') + row.name
         forms.append(f"{'' if alone else BETWEEN}{form.value}")
     return items, forms
@@ -120,9 +125,9 @@ def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[lis
         reply = yield from once(state, question(state, items, answer))
         if reply.end is End.DONE:
             note_error(state, reply)
-            found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
-            assert found is not None
-            return [each.removeprefix(BETWEEN).strip() for each in found.groups()]
+            match = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
+            assert match is not None
+            return [group.removeprefix(BETWEEN).strip() for group in match.groups()]
         if reply.end is End.REFUSED and not reply.doubtful:
             state.error_flag_read(True)
             return None
@@ -133,13 +138,13 @@ def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[lis
     raise NoAnswer(f"{who(state)} does not reply as expected: its settings were not read ({reply.end.value})")
 
 
-def _value(form: Form, text: str) -> Value:
-    if form in (Form.DIGIT, Form.WHOLE):
+def _value(form: SettingForm, text: str) -> Value:
+    if form in (SettingForm.DIGIT, SettingForm.WHOLE):
         return int(text)
-    if form is Form.FRACTION:
+    if form is SettingForm.FRACTION:
         return float(text)
-    fields = [each.strip() for each in text.split(",")]
-    numbers = tuple(int(each) if re.fullmatch(r"-?\d+", each) else each for each in fields)
+    fields = [part.strip() for part in text.split(",")]
+    numbers = tuple(int(field) if re.fullmatch(r"-?\d+", field) else field for field in fields)
     return numbers if len(numbers) > 1 else numbers[0]
 
 
@@ -201,7 +206,7 @@ class MCodeParameters(LexiumParameters):
         if state.address in EVERY_DRIVE:
             raise Refused(f"'{state.address}' is every drive; name one")
         refuse_in_program(state)
-        flag = yield from _print(state, "EF", [Form.DIGIT.value])
+        flag = yield from _print(state, "EF", [SettingForm.DIGIT.value])
         state.error_flag_read(flag != ["0"])
         if not state.serial:
             prints_it = state.product.startswith("LM") or state.codec.party or state.codec.checksum  # others may refuse

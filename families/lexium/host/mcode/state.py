@@ -15,7 +15,7 @@ Candidate = tuple[MCode, str]
 
 
 @dataclass(frozen=True)
-class Place:
+class ReplyPlace:
     """A place at which a drive may reply: party mode, name, and checksums (the likelier first)."""
 
     party: bool
@@ -27,7 +27,7 @@ class Place:
 class Unconfirmed:
     """The place of a drive that has not shown in this session what it is and how it is set."""
 
-    place: Place
+    place: ReplyPlace
     last: Remembered | None = None
     """The memory of it from last time."""
     stated: bool = False

@@ -22,7 +22,7 @@ class MCodeUnits(LexiumUnits):
         while missing := [word for word in rests_on(self.state.product) if word not in values]:
             asked = [*missing, "EF", "BY"]
             printed = yield from value_of(self.state, '," ",'.join(asked), " ".join([r"\d+(?:\.\d+)?"] * len(asked)))
-            *found, error, runs = printed.split()
+            *numbers, error, runs = printed.split()
             self.state.program_read(error=error == "1", running=runs == "1")
-            values |= dict(zip(missing, found, strict=True))
+            values |= dict(zip(missing, numbers, strict=True))
         return counted(self.state.product, values, full_steps)

@@ -45,7 +45,7 @@ from multidrop.families.lexium.host.values import SNAPSHOT_WORDS, LexiumValues, 
 from multidrop.families.lexium.manual import parameters as manual
 from multidrop.families.lexium.manual import points
 from multidrop.families.lexium.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS
-from multidrop.families.lexium.manual.parameters import Form, form_of
+from multidrop.families.lexium.manual.parameters import SettingForm, form_of
 from multidrop.families.lexium.manual.statements import UNNAMED
 from multidrop.families.lexium.manual.table import lookup, words
 
@@ -88,14 +88,14 @@ class MCodeValues(LexiumValues):
         items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
         now = dict(zip(asked, map(int, (yield from value_of(state, items, pattern)).split()), strict=True))
         program, remarks = yield from self._program(readings, running=bool(now["BY"]))
-        found = self.snapshot_of(readings, now)
+        snapshot = self.snapshot_of(readings, now)
         return replace(
-            found,
+            snapshot,
             name=state.name or UNNAMED,
             party=state.codec.party,
             baud=BAUDS.get(number_in(readings, "BD"), 0),
             program=program,
-            remarks=(*remarks, *found.remarks),
+            remarks=(*remarks, *snapshot.remarks),
         )
 
     def parts(self, facts: Facts) -> Sequence[Part]:
@@ -103,15 +103,15 @@ class MCodeValues(LexiumValues):
         state = self.state
         if state.codec.em == 3 or state.address in EVERY_DRIVE or state.programming:
             return ()
-        found = [
+        parts = [
             Part("state", partial(self._state, before=facts)),
             Part("settings", partial(self._values, names=points.SETTINGS), slow=True),
         ]
         if facts.get("BY") and SETTLED in facts:
-            return found  # a list has no signature, and a program prints lines, too
+            return parts  # a list has no signature, and a program prints lines, too
         if not (lists := manual.lists(state.product, state.version)):
-            return [*found, Part("points", partial(self._values, names=POINTS), slow=True)]
-        return found + [
+            return [*parts, Part("points", partial(self._values, names=POINTS), slow=True)]
+        return parts + [
             Part(word, partial(self._list, word=word, numbers=rows), slow=True) for word, rows in lists.items()
         ]
 
@@ -132,10 +132,10 @@ class MCodeValues(LexiumValues):
         """Read a value; a name with VA is looked up first, since asking for one that is not there is an error."""
         state = self.state
         refuse_in_program(state)
-        found = yield from MCodeDebugging(state).values([word])
-        if word not in found:
+        values = yield from MCodeDebugging(state).values([word])
+        if word not in values:
             raise Refused(f"{who(state)} has no variable {word}")
-        return printed_number(who(state), word, found[word])
+        return printed_number(who(state), word, values[word])
 
     def again(self, word: str, priority: Priority) -> Procedure[float]:
         """Read a value. The error flag is noted and not cleared."""
@@ -178,12 +178,12 @@ class MCodeValues(LexiumValues):
         yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))
         reply = yield from once(state, replace(question(state, items, answer), priority=Priority.POLL))
         check_printed(state, reply, REFUSAL)
-        found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
-        assert found is not None
+        match = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
+        assert match is not None
         facts: dict[str, Value] = {}
-        for row, text in zip(batch, found.groups(), strict=True):
-            fields = tuple(int(each) for each in text.removeprefix(BETWEEN).split(","))
-            facts[row.name] = fields if form_of(row) is Form.FIELDS else fields[0]
+        for row, text in zip(batch, match.groups(), strict=True):
+            fields = tuple(int(number) for number in text.removeprefix(BETWEEN).split(","))
+            facts[row.name] = fields if form_of(row) is SettingForm.FIELDS else fields[0]
         return facts
 
     def _list(self, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
@@ -207,7 +207,7 @@ class MCodeValues(LexiumValues):
         first = yield from listed(self.state, "L")
         if running and first != (yield from listed(self.state, "L")):
             return (), ["its program was not read: it runs, and its prints came between the lines"]
-        found = [_LISTED.fullmatch(line.strip()) for line in first]
-        lost = [line for line, row in zip(first, found, strict=True) if row is None]
+        rows = [_LISTED.fullmatch(line.strip()) for line in first]
+        lost = [line for line, row in zip(first, rows, strict=True) if row is None]
         doubts = [f"its listing has a line that is not a program line: {line!r}" for line in lost]
-        return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
+        return tuple((int(row[1]), row[2]) for row in rows if row is not None), doubts

@@ -42,7 +42,7 @@ def pdu_codec() -> PduCodec:
     return PduCodec()
 
 
-HEAD = 7
+HEAD_BYTES = 7
 """Bytes of the head of a message: number, protocol, length, unit."""
 
 
@@ -61,7 +61,7 @@ class Modbus(Codec):
 
     def replied(self, sent: bytes, received: bytes) -> bool | None:
         """By the number of the message, where it is one: a head with the number, zeros and the length of the rest."""
-        if len(sent) <= HEAD or sent[2:4] != b"\0\0" or int.from_bytes(sent[4:6]) != len(sent) - HEAD + 1:
+        if len(sent) <= HEAD_BYTES or sent[2:4] != b"\0\0" or int.from_bytes(sent[4:6]) != len(sent) - HEAD_BYTES + 1:
             return None
         return sent[:4] in received
 
@@ -72,14 +72,14 @@ class Modbus(Codec):
         """
         asked, number, at = request.body, request.tag % NUMBERS, 0
         try:
-            while (found := framing.first(buffer, at)) is not None:
-                at = found.end
-                if found.transaction == number and found.pdu[0] in (
+            while (message := framing.first(buffer, at)) is not None:
+                at = message.end
+                if message.transaction == number and message.pdu[0] in (
                     asked[0],
                     asked[0] | framing.EXCEPTION,
                     framing.EXCEPTION,
                 ):
-                    return Decoded(_reply(asked, found.pdu), at)
+                    return Decoded(_reply(asked, message.pdu), at)
         except framing.NotModbus:
             return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
         return None
@@ -120,8 +120,8 @@ class Modbus(Codec):
 
     def repeated(self, sent: bytes, rest: bytes, over: bool) -> bool:
         """Tell an adapter's repetition from the reply to a write of one register, which has the same bytes."""
-        found = framing.first(sent, 0)
-        return found is not None and found.pdu[0] not in WRITES
+        message = framing.first(sent, 0)
+        return message is not None and message.pdu[0] not in WRITES
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         return True
@@ -134,7 +134,7 @@ class Modbus(Codec):
             return True
         if statement is None or statement.word in USER:
             return False
-        row, values = lookup(statement.word), [getattr(each, "value", None) for each in statement.arguments]
+        row, values = lookup(statement.word), [getattr(argument, "value", None) for argument in statement.arguments]
         return row is None or (row.starts and not (row.name in CALM_AT_0 and values == [0]))
 
     def started(self, text: str) -> Started:
@@ -152,8 +152,8 @@ def _reply(asked: bytes, answer: bytes) -> Reply:
 def _whole(buffer: bytes) -> tuple[int, bool]:
     at = 0
     try:
-        while (found := framing.first(buffer, at)) is not None:
-            at = found.end
+        while (message := framing.first(buffer, at)) is not None:
+            at = message.end
     except framing.NotModbus:
         return at, True
     return at, False
@@ -162,12 +162,12 @@ def _whole(buffer: bytes) -> tuple[int, bool]:
 def _unlike(buffer: bytes, number: int, function: int) -> str:
     """Say what is wrong with whole messages that are no reply to a request; empty: none came, but to a stop."""
     at, wrong = 0, ""
-    while (found := framing.first(buffer, at)) is not None:
-        at = found.end
-        if found.transaction == number:
-            wrong = f"a reply with function {found.pdu[0]} came, and the request has function {function}"
-        elif found.transaction < NUMBERS:
-            wrong = f"a reply with transaction number {found.transaction} came, and the request has {number}"
+    while (message := framing.first(buffer, at)) is not None:
+        at = message.end
+        if message.transaction == number:
+            wrong = f"a reply with function {message.pdu[0]} came, and the request has function {function}"
+        elif message.transaction < NUMBERS:
+            wrong = f"a reply with transaction number {message.transaction} came, and the request has {number}"
     return wrong
 
 

@@ -65,7 +65,10 @@ class ModbusFamily(ModbusOperations, LexiumFamily):
         statement = grammar.parsed(text, USER)
         if statement is None or statement.word == "PR":
             return super().vouched(text, product)
-        register, values = REGISTERS.get(statement.word), [getattr(each, "value", None) for each in statement.arguments]
+        register, values = (
+            REGISTERS.get(statement.word),
+            [getattr(argument, "value", None) for argument in statement.arguments],
+        )
         if register is None or len(values) != 1 or not isinstance(values[0], int):
             return False
         return register.writable and register.allows(values[0])

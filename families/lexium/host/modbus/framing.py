@@ -54,7 +54,7 @@ class NotModbus(Exception):
 
 
 @dataclass(frozen=True)
-class Message:
+class ModbusMessage:
     """One message, and its end in the buffer."""
 
     transaction: int
@@ -63,7 +63,7 @@ class Message:
     end: int
 
 
-def first(buffer: bytes, start: int = 0) -> Message | None:
+def first(buffer: bytes, start: int = 0) -> ModbusMessage | None:
     """Find the message that begins at `start`; None while it is incomplete. Raises NotModbus."""
     if buffer[start + 2 : start + 4].strip(b"\0") or buffer[start + 4 : start + 5].strip(b"\0"):
         raise NotModbus
@@ -75,7 +75,7 @@ def first(buffer: bytes, start: int = 0) -> Message | None:
     end = start + 6 + length
     if len(buffer) < end:
         return None
-    return Message(int.from_bytes(buffer[start : start + 2]), buffer[start + 6], buffer[start + 7 : end], end)
+    return ModbusMessage(int.from_bytes(buffer[start : start + 2]), buffer[start + 6], buffer[start + 7 : end], end)
 
 
 def words_of(value: int, count: int) -> tuple[int, ...]:

@@ -19,7 +19,7 @@ def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Proc
 
     Raises Refused for a device that lacks it, NoAnswer where nothing shows what the device is.
     """
-    found: dict[int, str] = {}
+    objects: dict[int, str] = {}
     begin: int | None = 0
     while begin is not None:
         asked = request(state, "/device", pdu_codec().identify(code, begin))
@@ -32,9 +32,9 @@ def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Proc
             more, following = pdu_codec().objects(sure(state, asked, reply))
         except framing.NotModbus:
             raise NoAnswer(f"{who(state)}: the reply to '/device' is damaged") from None
-        found |= more
+        objects |= more
         begin = following if following is not None and following > begin else None
-    return found
+    return objects
 
 
 BASIC = 1

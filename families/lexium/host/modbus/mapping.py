@@ -14,7 +14,7 @@ from multidrop.families.lexium.host.modbus import framing
 from multidrop.families.lexium.host.modbus.codec import pdu_codec
 from multidrop.families.lexium.manual import errors
 from multidrop.families.lexium.manual.errors import ErrorNumber
-from multidrop.families.lexium.manual.grammar import Argument, Name, Number, Statement
+from multidrop.families.lexium.manual.grammar import Argument, NameTerm, Number, Statement
 from multidrop.families.lexium.manual.modbus.registers import (
     ALTERNATIVE,
     AT,
@@ -25,8 +25,8 @@ from multidrop.families.lexium.manual.modbus.registers import (
     OUTPUTS,
     REGISTERS,
     SETUPS,
-    Register,
-    Takes,
+    ModbusRegister,
+    WrittenValue,
 )
 from multidrop.families.lexium.manual.table import lookup
 
@@ -38,7 +38,7 @@ EVERY_OBJECT, ONE_OBJECT = 3, 4
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadRequest:
     """A request that reads a value, and the printed form of its reply."""
 
     pdu: bytes
@@ -66,13 +66,13 @@ def command(statement: Statement) -> bytes:
     return write(register, _value(register, arguments))
 
 
-def _value(register: Register, arguments: Sequence[Argument | None]) -> int:
+def _value(register: ModbusRegister, arguments: Sequence[Argument | None]) -> int:
     word = register.name
-    if register.takes is Takes.COMMAND and not arguments:
+    if register.takes is WrittenValue.COMMAND and not arguments:
         return 1
-    if register.takes is Takes.VARIABLE:
+    if register.takes is WrittenValue.VARIABLE:
         name = arguments[0] if len(arguments) == 1 else None
-        if not isinstance(name, Name):
+        if not isinstance(name, NameTerm):
             raise Inexpressible(f"{word} needs a variable, as in {word} R1")
         if name.word not in REGISTERS:
             raise unavailable(name.word)
@@ -104,7 +104,7 @@ def _specific(word: str, arguments: Sequence[Argument | None]) -> bytes:
         _none(word, arguments)
     elif not arguments:
         raise Inexpressible(f"{word} needs its parameters; /help {word} shows them")
-    text = ",".join(_parameter(each) for each in arguments)
+    text = ",".join(_parameter(argument) for argument in arguments)
     data = f"={text}" if word in SETUPS else text
     if len(data) > framing.LONGEST_STRING:
         raise Inexpressible(f"the parameters of {word} take {len(data)} characters, the drive {framing.LONGEST_STRING}")
@@ -118,12 +118,12 @@ def _parameter(argument: Argument | None) -> str:
         return str(argument.value)
     if isinstance(argument, Number):
         raise Inexpressible(f"{argument.value} is not a whole number; {ALTERNATIVE} may take it")
-    if isinstance(argument, Name):
+    if isinstance(argument, NameTerm):
         return argument.word
     raise Inexpressible(f"expressions are not evaluated over Modbus: give numbers, or use {ALTERNATIVE}")
 
 
-def write(register: Register, value: int) -> bytes:
+def write(register: ModbusRegister, value: int) -> bytes:
     """Write a value into its registers, whatever its range. Raises Inexpressible where it does not fit.
 
     One register has no sign: -1 there is 65535, which HT and others accept.
@@ -135,26 +135,26 @@ def write(register: Register, value: int) -> bytes:
     return pdu_codec().write_registers(register.address, framing.words_of(value, register.count))
 
 
-def reading(word: str) -> Reading:
+def reading(word: str) -> ReadRequest:
     """Build the request for `PR word`. Raises Inexpressible, or Refused for a word that cannot be printed."""
     if word in INPUTS:
         asked = pdu_codec().read(framing.READ_INPUTS, INPUTS[word], 1)
-        return Reading(asked, lambda answer: str(pdu_codec().bits(answer, 1)[0]))
+        return ReadRequest(asked, lambda answer: str(pdu_codec().bits(answer, 1)[0]))
     if word in SETUPS - REGISTERS.keys():
-        return Reading(pdu_codec().read_specific(word), _set_up)
+        return ReadRequest(pdu_codec().read_specific(word), _set_up)
     if word in IDENTITY:
         thing = IDENTITY[word]
         asked = pdu_codec().identify(ONE_OBJECT, thing)
-        return Reading(asked, lambda answer: pdu_codec().objects(answer)[0].get(thing, ""))
+        return ReadRequest(asked, lambda answer: pdu_codec().objects(answer)[0].get(thing, ""))
     register = REGISTERS.get(word)
     if register is None and word != "E" and word not in CONTROLS:
         raise unavailable(word)
     if register is None or not register.readable:
         outputs = OUTPUTS if word == "OT" else [word] if word in OUTPUTS else []
-        coils = " and ".join(f"/coil {OUTPUTS[each] + 1}" for each in outputs)
+        coils = " and ".join(f"/coil {OUTPUTS[output] + 1}" for output in outputs)
         reads = f"; {coils} {'reads' if len(outputs) == 1 else 'read'} it" if coils else ""
         raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}{reads}", UNREADABLE)
-    return Reading(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
+    return ReadRequest(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
 
 
 def _set_up(answer: bytes) -> str:
@@ -163,11 +163,11 @@ def _set_up(answer: bytes) -> str:
     return "0" if text == "0, 0, 0" else text
 
 
-def read(register: Register) -> bytes:
+def read(register: ModbusRegister) -> bytes:
     return pdu_codec().read(framing.READ_REGISTERS, register.address, register.count)
 
 
-def value_of(register: Register, words: Sequence[int]) -> int:
+def value_of(register: ModbusRegister, words: Sequence[int]) -> int:
     """Join the registers to a value; only values of four bytes are signed."""
     return framing.signed(words) if register.width == 4 else sum(word << 16 * n for n, word in enumerate(words))
 
@@ -180,7 +180,7 @@ def unavailable(word: str) -> Inexpressible:
     )
 
 
-def written(pdu: bytes) -> tuple[Register | None, int | None]:
+def written(pdu: bytes) -> tuple[ModbusRegister | None, int | None]:
     """Return the name that a write of registers goes to, and the value; None for a part of a value or another request.
 
     Of two names the second one is given if its value is out of its range.
@@ -193,11 +193,11 @@ def written(pdu: bytes) -> tuple[Register | None, int | None]:
         return None, None
     if row.address == address and row.count == count:
         return row, value_of(row, values)
-    each = [(AT.get(address + at), value) for at, value in enumerate(values)]
-    if parts := [found for found, _ in each if found is None or found.width == 4]:
+    register = [(AT.get(address + at), value) for at, value in enumerate(values)]
+    if parts := [place for place, _ in register if place is None or place.width == 4]:
         return parts[0], None
-    outside = [(found, value) for found, value in each if found is not None and not found.allows(value)]
-    return (outside or each)[0]
+    outside = [(place, value) for place, value in register if place is not None and not place.allows(value)]
+    return (outside or register)[0]
 
 
 def place(pdu: bytes) -> str:

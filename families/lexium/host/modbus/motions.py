@@ -26,18 +26,18 @@ class ModbusMotions(LexiumMotions):
     def read(self, words: Sequence[str]) -> Procedure[Mapping[str, int]]:
         """Read each of these registers that the product has."""
         state = self.state
-        found: dict[str, int] = {}
+        numbers: dict[str, int] = {}
         if not PRODUCT.fullmatch(state.product):
-            return found
+            return numbers
         for word in words:
             register = REGISTERS.get(word)
             if register is None or not register.readable or (register.only and state.product.startswith("LMDO")):
                 continue
             try:
-                found[word] = yield from value(state, word)
+                numbers[word] = yield from value(state, word)
             except Refused:
                 continue  # this drive lacks the register
-        return found
+        return numbers
 
     def error(self) -> Procedure[int | None]:
         return error_number(self.state)

@@ -19,7 +19,7 @@ from multidrop.families.lexium.host.classify import starts_motion
 from multidrop.families.lexium.host.errors import described, earlier_error, report_error
 from multidrop.families.lexium.host.modbus import framing, limits, mapping
 from multidrop.families.lexium.host.modbus.codec import USER, ModbusState, pdu_codec
-from multidrop.families.lexium.host.modbus.mapping import Reading
+from multidrop.families.lexium.host.modbus.mapping import ReadRequest
 from multidrop.families.lexium.host.operations import LexiumOperations
 from multidrop.families.lexium.manual import grammar
 from multidrop.families.lexium.manual.errors import BY_ITSELF
@@ -85,7 +85,7 @@ def printed(state: ModbusState, word: str, priority: Priority = Priority.OPERATO
     return shown(state, word, reading, sure(state, asked, (yield asked)))
 
 
-def shown(state: ModbusState, word: str, reading: mapping.Reading, answer: bytes) -> str:
+def shown(state: ModbusState, word: str, reading: mapping.ReadRequest, answer: bytes) -> str:
     try:
         return reading.shown(answer)
     except framing.NotModbus:
@@ -124,8 +124,8 @@ def valid_values(state: ModbusState, asked: Request, reply: Reply) -> Procedure[
     for word in limits.rests_on(row.name):
         if REGISTERS[word].only and state.product.startswith(OPEN_LOOP):  # reading it is an error of the drive
             now[word] = 0
-        elif (found := (yield from _quietly(state, word))) is not None:
-            now[word] = found
+        elif (number := (yield from _quietly(state, word))) is not None:
+            now[word] = number
     if taken := limits.own(row.name, value, now):
         return f", which takes {taken}"
     return f": {value} is in the range of the register, and this unit does not take it now"
@@ -215,7 +215,7 @@ class ModbusOperations(LexiumOperations):
     def _printed(self, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:
         """Print the items of a PR: one request for each name; the host inserts the rest."""
         state = self.state
-        if [each.word for each in statement.arguments if isinstance(each, grammar.Name)] == ["AL"]:
+        if [argument.word for argument in statement.arguments if isinstance(argument, grammar.NameTerm)] == ["AL"]:
             return (yield from self.every_register())
         pieces = []
         for item in list(_items(statement)):  # every item is checked before the first request
@@ -298,15 +298,15 @@ def parsed(text: str) -> grammar.Statement | None:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
 
 
-def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
-    rest = [each for each in statement.arguments if each is not None]
+def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, ReadRequest]]:
+    rest = [argument for argument in statement.arguments if argument is not None]
     while rest:
         item = rest.pop(0)
         if isinstance(item, grammar.Text):
             yield re.sub(r"\\(.)", lambda found: _ESCAPES.get(found[1], found[0]), item.value)
         elif isinstance(item, grammar.Number):
             yield str(item.value)
-        elif isinstance(item, grammar.Name):
+        elif isinstance(item, grammar.NameTerm):
             yield item.word, mapping.reading(item.word)
             sensor = item.word == "IT" and rest and isinstance(rest[0], grammar.Number)
             if sensor and rest.pop(0) != grammar.Number(1):

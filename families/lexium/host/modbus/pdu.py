@@ -138,11 +138,11 @@ class PduCodec:
             at += 2 + answer[at + 1]
         pdu = self._decoded(answer[:at])
         assert isinstance(pdu, ReadDeviceInformationResponse)
-        found = {}
+        objects = {}
         for number, value in pdu.information.items():
             last = value[-1] if isinstance(value, list) else value  # an object that comes twice
-            found[number] = last.decode("latin-1").strip("\0 ")
-        return found, pdu.next_object_id if pdu.more_follows else None
+            objects[number] = last.decode("latin-1").strip("\0 ")
+        return objects, pdu.next_object_id if pdu.more_follows else None
 
     def _decoded(self, answer: bytes) -> ModbusPDU:
         pdu = self._decoder.decode(answer)

@@ -12,7 +12,7 @@ from multidrop.families.lexium.host.modbus.identity import WARNING, identificati
 from multidrop.families.lexium.host.modbus.operations import answered, carried_out, request
 from multidrop.families.lexium.manual.modbus.registers import AT
 
-MOST = 2
+MOST_REGISTERS = 2
 """Most registers in one request (4.2.4, 4.2.5)."""
 
 
@@ -26,15 +26,15 @@ class ModbusRegisters(Registers):
         row = AT.get(address)
         if count is None:
             count = row.count if row is not None and row.address == address else 1
-        if not 1 <= count <= MOST:
-            raise Inexpressible(f"a request carries 1 or {MOST} registers, not {count}")
+        if not 1 <= count <= MOST_REGISTERS:
+            raise Inexpressible(f"a request carries 1 or {MOST_REGISTERS} registers, not {count}")
         asked = request(
             self.state, f"/register 0x{address:04X} {count}", pdu_codec().read(framing.READ_REGISTERS, address, count)
         )
-        found = pdu_codec().registers((yield from answered(self.state, asked)))
-        lines = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
+        numbers = pdu_codec().registers((yield from answered(self.state, asked)))
+        lines = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(numbers)]
         if row is not None and (row.address, row.count) == (address, count):
-            lines.append(f"{row.name} = {mapping.value_of(row, found)}")
+            lines.append(f"{row.name} = {mapping.value_of(row, numbers)}")
         return tuple(lines)
 
     def write(self, address: int, values: Sequence[int]) -> Printed:
@@ -43,8 +43,8 @@ class ModbusRegisters(Registers):
         if len(values) == 1 and row is not None and row.address == address:
             pdu = mapping.write(row, values[0])
         else:
-            if not 1 <= len(values) <= MOST:
-                raise Inexpressible(f"a request carries 1 or {MOST} registers, not {len(values)}")
+            if not 1 <= len(values) <= MOST_REGISTERS:
+                raise Inexpressible(f"a request carries 1 or {MOST_REGISTERS} registers, not {len(values)}")
             if wrong := [value for value in values if not -0x8000 <= value <= 0xFFFF]:
                 raise Inexpressible(f"{wrong[0]} does not fit into a register at 0x{address:04X}")
             pdu = pdu_codec().write_registers(address, [value & 0xFFFF for value in values])
@@ -71,12 +71,12 @@ class ModbusRegisters(Registers):
     def device(self) -> Printed:
         """Print the identification. What it says decides from now on whether the device is a stranger."""
         state = self.state
-        found = yield from identification(state)
+        objects = yield from identification(state)
         before = state.stranger
-        recognise(state, found)
+        recognise(state, objects)
         if before and not state.stranger:
             state.note(f"this device identified itself as {state.product} now, so it is used as a Lexium drive")
         elif state.stranger and not before:
             state.note(WARNING)
         names = dict(enumerate(mapping.OBJECTS))
-        return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))
+        return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(objects.items()))

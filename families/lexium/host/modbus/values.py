@@ -75,10 +75,10 @@ class ModbusParameters(LexiumParameters):
     def read(self, progress: Progress) -> Procedure[Readings]:
         """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
         state = self.state
-        settings = [each.name for each in manual.settings(state.product, state.version, state.part)]
+        settings = [setting.name for setting in manual.settings(state.product, state.version, state.part)]
         names = [name for name in settings if name in REGISTERS and "values" not in REGISTERS[name].differs]
         lists = {word: rows for word, rows in manual.lists(state.product, state.version).items() if word != "LS"}
-        found: dict[str, Value] = {}
+        values: dict[str, Value] = {}
         unread = [*manual.unread(state.product), *DECLARED]
         unread += [(name, NO_REGISTER) for name in settings if name not in names]
         for done, name in enumerate(names):
@@ -87,15 +87,15 @@ class ModbusParameters(LexiumParameters):
                 text = yield from printed(state, name)
                 if not re.fullmatch(r"-?\d+", text):
                     raise NoAnswer(f"{who(state)}: the reply to 'PR {name}' is damaged")
-                found[name] = int(text)
+                values[name] = int(text)
             except Refused as refusal:
                 unread.append((name, str(refusal)))
         for done, (word, numbers) in enumerate(lists.items(), len(names)):
             progress(done, len(names) + len(lists))
-            found |= _rows(word, numbers, (yield from printed(state, word)))
+            values |= _rows(word, numbers, (yield from printed(state, word)))
         progress(1, 1)
-        counts, table = manual.counting(found), words(state.product)
-        rows = [reading_of(name, value, table.get(name), counts) for name, value in found.items()]
+        counts, table = manual.counting(values), words(state.product)
+        rows = [reading_of(name, value, table.get(name), counts) for name, value in values.items()]
         return Readings(tuple(rows), tuple(unread))
 
     def plan(self, present: Readings, wanted: Mapping[str, Value], permission: Permission) -> Plan:
@@ -168,12 +168,12 @@ class ModbusValues(LexiumValues):
         state = self.state
         table = words(state.product)
         signs = [n for n in SIGNS if state.product in EVERY and state.product in table[n].products]
-        found = [Part("state", partial(self._state, names=(*FLAGS, *signs), before=facts))]
+        parts = [Part("state", partial(self._state, names=(*FLAGS, *signs), before=facts))]
         has = [n for n in points.SETTINGS if state.product not in EVERY or state.product in table[n].products]
-        found += [Part(name, partial(self._registers, names=(name,)), slow=True) for name in has]
+        parts += [Part(name, partial(self._registers, names=(name,)), slow=True) for name in has]
         lists = manual.lists(state.product, state.version)
-        found += [Part(word, partial(self._setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
-        return found
+        parts += [Part(word, partial(self._setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
+        return parts
 
     def fold(self, facts: Facts) -> tuple[Conditions, ...]:
         return (points.conditions(self.state.product, facts, None),)
@@ -194,29 +194,29 @@ class ModbusValues(LexiumValues):
         return printed_number(who(self.state), word, (yield from printed(self.state, word, priority)))
 
     def _registers(self, names: Sequence[str]) -> Procedure[Facts]:
-        found = {}
+        values = {}
         for name in names:
-            found[name] = yield from value(self.state, name, Priority.POLL)
-        if "EF" in found:
-            self.state.error_flag_read(bool(found["EF"]))
-        return found
+            values[name] = yield from value(self.state, name, Priority.POLL)
+        if "EF" in values:
+            self.state.error_flag_read(bool(values["EF"]))
+        return values
 
     def _points(self) -> Procedure[Facts]:
         """Read all inputs, then all outputs; an input's bit is 1 while it is active."""
-        found: dict[str, int] = {}
+        points: dict[str, int] = {}
         for letter, function, count in (("I", framing.READ_INPUTS, INPUTS), ("O", framing.READ_COILS, OUTPUTS)):
             asked = request(
                 self.state, f"{letter}1 to {letter}{count}", pdu_codec().read(function, 0, count), Priority.POLL
             )
             bits = pdu_codec().bits(sure(self.state, asked, (yield asked)), count)
-            found |= {f"{letter}{n}": bit for n, bit in enumerate(bits, 1)}
-        return found
+            points |= {f"{letter}{n}": bit for n, bit in enumerate(bits, 1)}
+        return points
 
     def _state(self, names: Sequence[str], before: Facts) -> Procedure[Facts]:
         state = self.state
-        found = {**(yield from self._registers(names)), **(yield from self._points())}
-        found[points.CAUSE] = cause(state.product, found, before)
-        return found
+        facts = {**(yield from self._registers(names)), **(yield from self._points())}
+        facts[points.CAUSE] = cause(state.product, facts, before)
+        return facts
 
     def _setups(self, word: str) -> Procedure[Facts]:
         return _rows(word, LISTS[word], (yield from printed(self.state, word, Priority.POLL)))

@@ -23,11 +23,11 @@ from multidrop.families.lexium.manual.modbus.registers import (
     OUTPUTS,
     REGISTERS,
     SETUPS,
-    Register,
+    ModbusRegister,
 )
 from multidrop.families.lexium.manual.table import MNEMONICS, lookup, words
 
-LAST = max(AT)
+LAST_ADDRESS = max(AT)
 _ADDRESS = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})")
 _USER = re.compile(r"V[1-8]")
 _ELSEWHERE = re.compile(r"BR <|.*<operator>|.*,<1/2>")
@@ -44,8 +44,8 @@ class ModbusLanguage(mcode.MCodeLanguage):
     """Help on the names that Modbus carries; the rest is MCode's."""
 
     def names(self) -> list[str]:
-        found = {name for name, row in words("LMDCE").items() if _ethernet(row)}
-        return sorted(found | REGISTERS.keys())
+        ethernet_words = {name for name, row in words("LMDCE").items() if _ethernet(row)}
+        return sorted(ethernet_words | REGISTERS.keys())
 
     def knows(self, word: str) -> bool:
         """Return whether a word, or the address of a register, has help."""
@@ -66,17 +66,17 @@ class ModbusLanguage(mcode.MCodeLanguage):
 
     def offered(self, product: str, typed: str) -> Iterable[tuple[str, str]]:
         """Return the words that Modbus carries."""
-        return (each for each in super().offered(product, typed) if each[0] in REACHED)
+        return (offer for offer in super().offered(product, typed) if offer[0] in REACHED)
 
     def hint(self, text: str, product: str = "") -> str:
         """Return syntax and meaning of the word being typed, and its register; empty where it is unknown."""
         said = super().hint(text, product)
-        found = re.match(r"(?:PR )?([A-Z]+\d?)", said)
-        if found is None or lookup(found[1]) is None:
+        match = re.match(r"(?:PR )?([A-Z]+\d?)", said)
+        if match is None or lookup(match[1]) is None:
             return said
-        register = REGISTERS.get(found[1])
+        register = REGISTERS.get(match[1])
         where = (
-            f"register 0x{register.address:04X}" if register else "" if found[1] in REACHED else "no Modbus register"
+            f"register 0x{register.address:04X}" if register else "" if match[1] in REACHED else "no Modbus register"
         )
         return f"{said}; {where}" if where else said
 
@@ -88,16 +88,18 @@ def _ethernet(row: Mnemonic) -> bool:
     return any(ETHERNET.fullmatch(product) for product in row.products)
 
 
-def _at(address: int) -> Register:
+def _at(address: int) -> ModbusRegister:
     """The value that a register belongs to. Raises Diagnostic for a reserved one."""
     if address not in AT:
         raise Diagnostic(
-            f"no register 0x{address:04X} in the map", "", f"the map has 0x0000 to 0x{LAST:04X}, some of them reserved"
+            f"no register 0x{address:04X} in the map",
+            "",
+            f"the map has 0x0000 to 0x{LAST_ADDRESS:04X}, some of them reserved",
         )
     return AT[address]
 
 
-def _place_of(register: Register, address: int) -> str:
+def _place_of(register: ModbusRegister, address: int) -> str:
     if register.count == 1:
         return f"0x{address:04X} is the register of {register.name}"
     half = "low" if address == register.address else "high"
@@ -142,7 +144,7 @@ def _facts(row: Mnemonic, product: str) -> dict[str, str]:
     return {label: merged.get(label, "") for label in LABELS}
 
 
-def _registers(register: Register) -> str:
+def _registers(register: ModbusRegister) -> str:
     if register.count == 1:
         return f"0x{register.address:04X}"
     return f"0x{register.address:04X} and 0x{register.address + 1:04X}, the low word first"
@@ -165,7 +167,7 @@ def _function(name: str) -> str:
     return "66, as text" if name in CONTROLS else ""
 
 
-def _range(register: Register, row: Mnemonic) -> str:
+def _range(register: ModbusRegister, row: Mnemonic) -> str:
     """The range of the map in words; a value in a form of its own has no unit of MCode."""
     if not register.limits:
         return ""
@@ -183,7 +185,7 @@ def shown(limits: str) -> str:
     return text if " to " in text else ", ".join(text.split())
 
 
-def _of_the_drive(register: Register, row: Mnemonic) -> str:
+def _of_the_drive(register: ModbusRegister, row: Mnemonic) -> str:
     """The range that MCode has for a word, where it is another; empty where it is the same or none."""
     if row.low is None or not register.limits:
         return ""
@@ -196,7 +198,7 @@ def _of_the_drive(register: Register, row: Mnemonic) -> str:
     return f"{mcode.range_of(row)}{both}"
 
 
-def _default(register: Register, default: str) -> str:
+def _default(register: ModbusRegister, default: str) -> str:
     """The default as we rule, and the map's where it is another."""
     if register.default is None or not default:
         return default or ("" if register.default is None else str(register.default))

@@ -20,7 +20,7 @@ from multidrop.base.files import rows
 INT32 = (-(2**31), 2**31 - 1)
 
 
-class Takes(StrEnum):
+class WrittenValue(StrEnum):
     """What a write gives to a register."""
 
     NOTHING = "-"
@@ -35,7 +35,7 @@ DIFFERENCES = frozenset({"values", "range", "note"})
 
 
 @dataclass(frozen=True)
-class Register:
+class ModbusRegister:
     """One name's place in the register map."""
 
     name: str
@@ -52,7 +52,7 @@ class Register:
     default: int | None
     only: str
     """`closed loop` or `hMT`, where other drives lack it."""
-    takes: Takes
+    takes: WrittenValue
     """What a write gives it."""
     differs: frozenset[str]
     """What is not as MCode has it.
@@ -78,14 +78,14 @@ class Register:
     def spans(self) -> tuple[tuple[int, int], ...]:
         """The range as pairs of lowest and highest; VI and VM without each other's bound; empty: any value."""
         text = self.limits.replace("int32", "{}..{}".format(*INT32)).replace("VM-1", "4999999").replace("VI+1", "2")
-        found = re.findall(r"(-?\d+)(?:\.\.(-?\d+))?", text)
-        return tuple((int(low), int(high or low)) for low, high in found)
+        matches = re.findall(r"(-?\d+)(?:\.\.(-?\d+))?", text)
+        return tuple((int(low), int(high or low)) for low, high in matches)
 
     def allows(self, value: int) -> bool:
         return not self.spans or any(low <= value <= high for low, high in self.spans)
 
 
-def record(row: Mapping[str, str]) -> Register:
+def record(row: Mapping[str, str]) -> ModbusRegister:
     """Make the record of a row. Raises ValueError for a wrong cell."""
     if empty := [column for column, text in row.items() if not text]:
         raise ValueError(f"the row of {row['name']} says nothing of: {', '.join(empty)}")
@@ -93,7 +93,7 @@ def record(row: Mapping[str, str]) -> Register:
     differs = frozenset(said["differs"].split())
     if differs - DIFFERENCES:
         raise ValueError(f"{row['name']}: {row['differs']} is no difference")
-    return Register(
+    return ModbusRegister(
         name=row["name"],
         address=int(row["address"], 16),
         count=int(row["count"]),
@@ -102,22 +102,22 @@ def record(row: Mapping[str, str]) -> Register:
         limits=said["limits"],
         default=int(said["default"]) if said["default"] else None,
         only=said["only"],
-        takes=Takes(row["takes"]),
+        takes=WrittenValue(row["takes"]),
         differs=differs,
         form=said["form"],
     )
 
 
-ROWS: tuple[Register, ...] = tuple(map(record, rows(__file__, "registers.csv")))
-REGISTERS: Mapping[str, Register] = {row.name: row for row in ROWS}
+ROWS: tuple[ModbusRegister, ...] = tuple(map(record, rows(__file__, "registers.csv")))
+REGISTERS: Mapping[str, ModbusRegister] = {row.name: row for row in ROWS}
 """Registers by name."""
-AT: Mapping[int, Register] = {address: row for row in ROWS for address in row.addresses}
+AT: Mapping[int, ModbusRegister] = {address: row for row in ROWS for address in row.addresses}
 """Registers by address; both registers of a value lead to it. A missing address is reserved."""
 
 # What the drive has beside registers: functions by name (4.3) and the device identification (4.1).
 
 
-class Way(StrEnum):
+class WordFunction(StrEnum):
     """A function that carries a word, beside those of registers."""
 
     SETUP = "set-up"
@@ -136,28 +136,28 @@ class Way(StrEnum):
     """2, at an address."""
 
 
-_WAYS = [(row["word"], Way(row["way"]), row["number"]) for row in rows(__file__, "functions.csv")]
+_WAYS = [(row["word"], WordFunction(row["way"]), row["number"]) for row in rows(__file__, "functions.csv")]
 
 
-def _numbered(way: Way) -> Mapping[str, int]:
+def _numbered(way: WordFunction) -> Mapping[str, int]:
     return {word: int(number) for word, each, number in _WAYS if each is way}
 
 
-def _carried(*ways: Way) -> frozenset[str]:
+def _carried(*ways: WordFunction) -> frozenset[str]:
     return frozenset(word for word, way, _ in _WAYS if way in ways)
 
 
-SETUPS = _carried(Way.SETUP)
+SETUPS = _carried(WordFunction.SETUP)
 """Set-ups, which function 65 reads and function 66 writes as text."""
-POINTS = _numbered(Way.POINT)
+POINTS = _numbered(WordFunction.POINT)
 """The inputs by the name that the manual's example has for their set-up (4.3.3), the older drives' own."""
-CONTROLS = _carried(Way.CONTROL)
+CONTROLS = _carried(WordFunction.CONTROL)
 """Commands on programs, which function 66 carries. E goes through function 65."""
-BY_FUNCTION = _carried(Way.SETUP, Way.CONTROL, Way.END, Way.IDENTITY)
+BY_FUNCTION = _carried(WordFunction.SETUP, WordFunction.CONTROL, WordFunction.END, WordFunction.IDENTITY)
 """Words that a function with a name or an object carries."""
-IDENTITY = _numbered(Way.IDENTITY)
+IDENTITY = _numbered(WordFunction.IDENTITY)
 """Words that the device identification answers, by object."""
-OUTPUTS, INPUTS = _numbered(Way.OUTPUT), _numbered(Way.INPUT)
+OUTPUTS, INPUTS = _numbered(WordFunction.OUTPUT), _numbered(WordFunction.INPUT)
 """Outputs and inputs by name, with their addresses in functions 1, 5 and 2."""
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
 """The other way to the same drive, which has every word."""

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Argument, Name, Number, Statement, Text
+from multidrop.families.lexium.manual.grammar import Argument, NameTerm, Number, Statement, Text
 from multidrop.families.lexium.manual.groups import LISTS, TRIPS, TRIPS_WITH_VALUE
 from multidrop.families.lexium.manual.mnemonic import Mnemonic
 from multidrop.families.lexium.manual.table import MNEMONICS
@@ -23,7 +23,7 @@ from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.motor_commands import MotorCommands, Setups
 from multidrop.families.lexium.simulator.language.program_commands import ProgramCommands
 from multidrop.families.lexium.simulator.language.variables import Compile, Variables, bare, is_place, only
-from multidrop.families.lexium.simulator.state.errors import CRLF, Fault
+from multidrop.families.lexium.simulator.state.errors import CRLF, DriveFault
 from multidrop.families.lexium.simulator.state.expressions import FLOATS, Read, Value, whole, wrap
 from multidrop.families.lexium.simulator.state.memory import slot
 from multidrop.families.lexium.simulator.state.program_memory import Action
@@ -42,7 +42,7 @@ def unescape(text: str) -> str:
     return re.sub(r"\\(.)", lambda found: _ESCAPES.get(found[1], found[0]), text, flags=re.DOTALL)
 
 
-class Prints:
+class PrintInstruction:
     """PR of one drive with this serial number."""
 
     def __init__(self, serial: str, drive: EventLoop, variables: Variables) -> None:
@@ -79,14 +79,14 @@ class Prints:
         rest = [each for each in statement.arguments if each is not None]
         while rest:
             argument = rest.pop(0)
-            word = argument.word if isinstance(argument, Name) else ""
+            word = argument.word if isinstance(argument, NameTerm) else ""
             if word in self._with_option and self._memory.row(word):
                 option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
                 number = option.value if isinstance(option, Number) else 0
                 if number not in (0, 1, 2):
-                    raise Fault(E.OUT_OF_RANGE)
+                    raise DriveFault(E.OUT_OF_RANGE)
                 if word == "VT" and number == 1 and not self._memory.model.auxiliary:
-                    raise Fault(E.NOT_AVAILABLE)
+                    raise DriveFault(E.NOT_AVAILABLE)
                 yield partial(self._with_option[word], int(number))
             else:
                 yield self._item(argument)
@@ -98,11 +98,11 @@ class Prints:
         if isinstance(argument, Number) and not isinstance(argument.value, float):
             constant = str(argument.value)
             return lambda: constant
-        if not isinstance(argument, Name):
-            raise Fault(E.NOT_PRINTABLE)
+        if not isinstance(argument, NameTerm):
+            raise DriveFault(E.NOT_PRINTABLE)
         word, row = argument.word, self._memory.readable(argument.word)
         if row is not None and row.access in ("-", "WO"):
-            raise Fault(E.NOT_PRINTABLE)
+            raise DriveFault(E.NOT_PRINTABLE)
         if row is not None and word in self._shapes:
             return self._shapes[word]
         read = self._variables.reader(word)
@@ -117,13 +117,13 @@ class Prints:
         setting = self._memory.texts["PF"]
         if not setting:
             return f"{value:.6f}"
-        width, decimals, scientific, left = (int(each) for each in setting.split(","))
+        width, decimals, scientific, left = (int(number) for number in setting.split(","))
         text = f"{value:.{decimals}E}" if scientific else f"{value:.{decimals}f}"
         return text.ljust(width) if left else text.rjust(width)
 
     def _user(self, word: str) -> str:
         if word not in self._memory.scopes:
-            raise Fault(E.NOT_PRINTABLE)
+            raise DriveFault(E.NOT_PRINTABLE)
         return str(self._memory.values[slot(word)])
 
     def _error(self) -> str:
@@ -166,14 +166,14 @@ class Prints:
             return str(self._memory.values["ER"])
         if name in self._with_option:
             return self._with_option[name](0)
-        return self._item(Name(name))()
+        return self._item(NameTerm(name))()
 
     def _setups(self, word: str) -> list[str]:
         """The lines of PR IS, PR OS or PR LS."""
         if word == "IS":
             return [f"IS = {n}, {self._point(n)}" for n in LISTS["IS"]]
         rows = self._outputs.types if word == "OS" else self._motor.limits.software
-        return [f"{word} = {n}, {_fields(each)}" for n, each in rows.items()]
+        return [f"{word} = {n}, {_fields(row)}" for n, row in rows.items()]
 
     def _point(self, n: int) -> str:
         return _fields(self._motor.inputs.types[n])
@@ -184,7 +184,7 @@ class Prints:
         if trip is None:
             return "0"
         target = trip.target
-        name = target.word if isinstance(target, Name) else str(target.value if isinstance(target, Number) else 0)
+        name = target.word if isinstance(target, NameTerm) else str(target.value if isinstance(target, Number) else 0)
         if word not in TRIPS_WITH_VALUE:
             return name
         return f"{trip.value}, {name}" + (f", {trip.repeats}" if word == "TR" else "")
@@ -212,7 +212,7 @@ def _listed(lines: list[str]) -> str:
 
 
 def _fields(values: tuple[int, ...]) -> str:
-    return ", ".join(str(each) for each in values)
+    return ", ".join(str(value) for value in values)
 
 
 class Instructions:
@@ -225,7 +225,7 @@ class Instructions:
         self._programs = programs = ProgramCommands(drive, variables)
         self.motions = MotorCommands(drive, variables)
         setups = Setups(drive, variables)
-        prints = Prints(serial, drive, variables)
+        prints = PrintInstruction(serial, drive, variables)
         self.commands: Mapping[str, Compile] = {
             "IC": partial(self._step, 1),
             "DC": partial(self._step, -1),
@@ -245,7 +245,7 @@ class Instructions:
             return None
         try:
             return self._variables.reader(word)
-        except Fault:
+        except DriveFault:
             return None
 
     def compile(self, statement: Statement, stored: bool) -> Action:
@@ -256,15 +256,15 @@ class Instructions:
         row = self._memory.row(word)
         if row is None:
             if not self._variables.declared(word) and word not in self._program.labels:
-                raise Fault(E.UNKNOWN_VARIABLE if statement.equals else E.UNKNOWN_COMMAND)
+                raise DriveFault(E.UNKNOWN_VARIABLE if statement.equals else E.UNKNOWN_COMMAND)
             return self._assignment(statement)
         if row.kind in ("math", "reserved"):
             illegal = row.kind == "reserved" and statement.arguments
-            raise Fault(E.ILLEGAL_DATA if illegal else E.UNKNOWN_COMMAND)
+            raise DriveFault(E.ILLEGAL_DATA if illegal else E.UNKNOWN_COMMAND)
         if not (row.program if stored else row.immediate):
-            raise Fault(E.ILLEGAL_DATA if stored else E.NOT_IN_PROGRAM_MODE)
-        if stored and word == "PR" and Name("AL") in statement.arguments:  # for immediate use only (manual 5.1.4)
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA if stored else E.NOT_IN_PROGRAM_MODE)
+        if stored and word == "PR" and NameTerm("AL") in statement.arguments:  # for immediate use only (manual 5.1.4)
+            raise DriveFault(E.ILLEGAL_DATA)
         if word in self.commands:
             return self.commands[word](statement)
         if row.kind == "instruction":
@@ -275,43 +275,43 @@ class Instructions:
         """The action of a stored line; one that cannot be carried out any more is an error when it is reached."""
         try:
             return self.compile(statement, stored=True)
-        except Fault as fault:
+        except DriveFault as fault:
             code, fatal = fault.code, fault.fatal
 
             def refuse() -> None:
-                raise Fault(code, fatal)
+                raise DriveFault(code, fatal)
 
             return refuse
 
     def _assignment(self, statement: Statement) -> Action:
         """`VM=5` or `VM 5`, and what is computed."""
         if not statement.arguments:
-            raise Fault(E.ILLEGAL_DATA if statement.equals else E.NOT_EXECUTABLE)
+            raise DriveFault(E.ILLEGAL_DATA if statement.equals else E.NOT_EXECUTABLE)
         write = self._variables.writer(statement.word)
         read = self._variables.value(only(statement), statement.word in REGISTERS)
         return lambda: write(read())
 
     def _without_effect(self, row: Mnemonic, statement: Statement) -> Action:
         """An instruction without effect in the simulation; it checks its value."""
-        reads = [self._variables.value(each) for each in statement.arguments if not is_place(each)]
+        reads = [self._variables.value(argument) for argument in statement.arguments if not is_place(argument)]
 
         def check() -> None:
             if reads and not row.accepts(reads[0]()):
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
 
         return check
 
     def _step(self, by: int, statement: Statement) -> Action:
         """IC and DC: add to a variable. Raises Fault (25, 26) for one that may not be stepped."""
         target, variables = only(statement), self._variables
-        if not isinstance(target, Name):
-            raise Fault(E.ILLEGAL_DATA)
+        if not isinstance(target, NameTerm):
+            raise DriveFault(E.ILLEGAL_DATA)
         word = target.word
         row = self._memory.row(word)
         if row is not None and row.step:
-            raise Fault(E.ILLEGAL_DATA if row.kind == "reserved" else row.step)
+            raise DriveFault(E.ILLEGAL_DATA if row.kind == "reserved" else row.step)
         if row is None and not variables.declared(word):
-            raise Fault(E.READ_ONLY)
+            raise DriveFault(E.READ_ONLY)
         read, write = variables.reader(word), variables.writer(word)
         if row is not None and isinstance(row.default, float):
             return lambda: write(read() + by)
@@ -319,7 +319,7 @@ class Instructions:
 
         def add() -> None:
             if row is None and word not in scopes:
-                raise Fault(E.READ_ONLY)
+                raise DriveFault(E.READ_ONLY)
             write(wrap(whole(read()) + by))
 
         return add
@@ -327,4 +327,4 @@ class Instructions:
 
 def _refused(statement: Statement) -> Action:
     """UG: refuse to replace the firmware."""
-    raise Fault(E.ILLEGAL_DATA)
+    raise DriveFault(E.ILLEGAL_DATA)

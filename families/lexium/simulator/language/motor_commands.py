@@ -19,7 +19,7 @@ from multidrop.families.lexium.manual.value_forms import MOST_REPEATS
 from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.variables import Compile, Variables, bare, is_place, missing, only
 from multidrop.families.lexium.simulator.motion.inputs import ANALOG
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.expressions import whole
 from multidrop.families.lexium.simulator.state.memory import Trip
 from multidrop.families.lexium.simulator.state.program_memory import Action
@@ -66,14 +66,14 @@ class MotorCommands:
         """MA and MR (manual 5.1.80, 5.1.84)."""
         kind, arguments = statement.word, statement.arguments
         if not 1 <= len(arguments) <= 3:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         value = self._variables.value(arguments[0])
-        options = [self._variables.value(each or Number(0)) for each in arguments[1:]]
+        options = [self._variables.value(argument or Number(0)) for argument in arguments[1:]]
 
         def go() -> None:
-            chosen = [whole(each()) for each in options]
+            chosen = [whole(option()) for option in options]
             if any(each not in (0, 1) for each in chosen):
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             announce, run_on = (*chosen, 0, 0)[:2]
             self._motor.axis.go(kind, whole(value()), self._timeline.now, bool(announce), bool(run_on))
             self._begun(kind)
@@ -98,9 +98,9 @@ class MotorCommands:
         """HM, HI, HF. Without a type it is error 81 as for an unknown one."""
         word = statement.word
         if len(statement.arguments) > 1:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         if not statement.arguments:
-            raise Fault(E.NO_HOMING_TYPE)
+            raise DriveFault(E.NO_HOMING_TYPE)
         read = self._variables.value(statement.arguments[0])
         return lambda: self._motor.homing.start(word, whole(read()), self._timeline.now)
 
@@ -108,17 +108,17 @@ class MotorCommands:
         """MU: the mode, and 1 to clear lead and lag."""
         mode, clearing = (*values, 0)[:2]
         if mode not in (0, 1, 2) or clearing not in (0, 1):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         self._motor.hmt.make_up(mode, clearing, self._timeline.now)
 
     def _test(self, statement: Statement) -> Action:
         """SC 1. Raises Fault (24) without its number."""
         if not statement.arguments:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
 
         def start(values: list[int]) -> None:
             if values != [1]:
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             self._motor.start_test(self._timeline.now)
 
         return self._variables.numbers(start, 1, 1)(statement)
@@ -167,11 +167,11 @@ class Setups:
 
         def set_up(given: list[int]) -> None:
             values = (*given, 0, 0)[:fields]
-            if any(each not in (0, 1) for each in values[1:]):
-                raise Fault(E.OUT_OF_RANGE)
+            if any(value not in (0, 1) for value in values[1:]):
+                raise DriveFault(E.OUT_OF_RANGE)
             was = self._inputs.types[n]
-            for each in points.clocks if n in points.clocks else (n,):
-                self._set_point(each, values)
+            for clock in points.clocks if n in points.clocks else (n,):
+                self._set_point(clock, values)
             self._wired(n, was)
 
         return self._variables.numbers(set_up, 1 if n == ANALOG else 2, fields)
@@ -181,7 +181,7 @@ class Setups:
         points, kind, active = self._points, values[0], values[1]
         if kind in points.output_types.get(n, ()):
             if any(values[2:]) and not points.sources:
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             self._outputs.set_up([n, kind, active])
         else:
             self._inputs.set_up([n, kind, active])
@@ -192,11 +192,11 @@ class Setups:
         """LS; the minus limit must be below the plus limit while both are enabled (manual 5.1.78)."""
         limits, (which, position, enabled) = self._motor.limits.software, values
         if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         other, other_enabled = limits[1 - which]
         crossed = position <= other if which else position >= other
         if enabled and other_enabled and crossed:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         change = {which: (position, enabled)}
         self._motor.limit_stop.relocate(lambda: limits.update(change), self._timeline.now)
         self._timeline.replan()
@@ -207,7 +207,7 @@ class Setups:
         """PF (manual 5.1.97). Its default is the format of a new drive, which pads nothing."""
         values = [*values, *PRINT_FORMAT[len(values) :]]
         if not all(0 <= value <= most for value, most in zip(values, MNEMONICS["PF"].setup.numbers[1:], strict=True)):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         self._keep("PF", [] if values == [*PRINT_FORMAT] else values)
 
     def _keep(self, word: str, values: list[int]) -> None:
@@ -216,14 +216,14 @@ class Setups:
     def _device_name(self, statement: Statement) -> Action:
         """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""
         if statement.equals and not statement.arguments:  # `DN='a'`: its apostrophe begins a remark
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if len(statement.arguments) != 1:
-            raise Fault(E.ILLEGAL_DATA if statement.arguments else E.NOT_EXECUTABLE)
+            raise DriveFault(E.ILLEGAL_DATA if statement.arguments else E.NOT_EXECUTABLE)
         name = device_name_of(statement.arguments[0], not self._memory.model.name_codes)
 
         def set_up() -> None:
             if not name:
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             self._memory.texts["DN"] = name
 
         return set_up
@@ -245,7 +245,7 @@ class Setups:
         if word == "TA" and arguments == (Number(0),):
             return lambda: self._motor.trips.forget(TRIPS[word])
         if len(arguments) < 2 and not repeats_too:
-            raise Fault(E.NO_SEPARATOR)
+            raise DriveFault(E.NO_SEPARATOR)
         value_at, *more = arguments
         target = self._target(more, 2 if repeats_too else 1)
         read = self._variables.value(value_at)
@@ -260,19 +260,19 @@ class Setups:
 
     def _target(self, places: tuple[Argument | None, ...] | list[Argument | None], most: int) -> Argument | None:
         """The subroutine of a trip; None for 0 and for none. Raises Fault (24)."""
-        if len(places) > most or any(not is_place(each) for each in places[:1]):
-            raise Fault(E.ILLEGAL_DATA)
+        if len(places) > most or any(not is_place(place) for place in places[:1]):
+            raise DriveFault(E.ILLEGAL_DATA)
         return None if not places or places[0] == Number(0) else places[0]
 
     def _check_trip(self, word: str, value: int, times: int) -> None:
         """Check what a trip waits for. Raises Fault (10, 21)."""
         row = lookup(word, self._memory.product)
         if (row is not None and not row.accepts(value)) or not 0 <= times <= MOST_REPEATS:
-            raise Fault(E.NO_SUCH_POINT if word == "TI" else E.OUT_OF_RANGE)
+            raise DriveFault(E.NO_SUCH_POINT if word == "TI" else E.OUT_OF_RANGE)
         if word == "TI" and value not in self._inputs.numbers:
-            raise Fault(E.NO_SUCH_POINT)
+            raise DriveFault(E.NO_SUCH_POINT)
         if word == "TR" and not value:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
 
     def _define(self, word: str, trip: Trip) -> None:
         if trip.target is not None:

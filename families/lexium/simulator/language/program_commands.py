@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Compare, Name, Number, Statement, Text
+from multidrop.families.lexium.manual.grammar import Compare, NameTerm, Number, Statement, Text
 from multidrop.families.lexium.manual.table import lookup
 from multidrop.families.lexium.simulator.event_loop import EventLoop
 from multidrop.families.lexium.simulator.language.variables import Compile, Variables, bare, is_place, only, pair
-from multidrop.families.lexium.simulator.state.errors import CRLF, Fault
+from multidrop.families.lexium.simulator.state.errors import CRLF, DriveFault
 from multidrop.families.lexium.simulator.state.expressions import whole
 from multidrop.families.lexium.simulator.state.memory import within
-from multidrop.families.lexium.simulator.state.program_memory import FIRST, SPACE, Action
+from multidrop.families.lexium.simulator.state.program_memory import FIRST_ADDRESS, PROGRAM_BYTES, Action
 
-ADDRESSES = range(FIRST, FIRST + SPACE)
+ADDRESSES = range(FIRST_ADDRESS, FIRST_ADDRESS + PROGRAM_BYTES)
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))
 """CP's parameter: keep the user's variables, or delete them too."""
@@ -71,7 +71,7 @@ class ProgramCommands:
         """BR, CL; a condition may also be a value, which holds while it is not 0 (manual 5.1.2, 5.1.14)."""
         target, condition = pair(statement)
         if target is None or not is_place(target) or isinstance(condition, Text):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
 
         holds = None if condition is None else self._variables.compiler.condition(condition)
         printer, thread, linked = self._printer, self._thread, self._interpreter.linked
@@ -82,7 +82,7 @@ class ProgramCommands:
             if holds is not None and not holds():
                 return
             if printer.immediate and not thread.running:
-                raise Fault(E.NO_PROGRAM_RUNNING)
+                raise DriveFault(E.NO_PROGRAM_RUNNING)
             if place < 0 or places is not linked.places:
                 place = linked.place(target)
                 places = linked.places
@@ -96,16 +96,16 @@ class ProgramCommands:
     def _hold(self, statement: Statement) -> Action:
         """H (manual 5.1.50). Where 0 is taken it is for motion."""
         if len(statement.arguments) > 1:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         read = self._variables.value(statement.arguments[0]) if statement.arguments else None
         row = lookup("H", self._memory.product)
 
         def wait() -> None:
             if self._printer.immediate and not self._thread.running:
-                raise Fault(E.NO_PROGRAM_RUNNING)
+                raise DriveFault(E.NO_PROGRAM_RUNNING)
             milliseconds = None if read is None else whole(read())
             if row is None or not (milliseconds is None or row.accepts(milliseconds)):
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             if milliseconds:
                 self._thread.hold(milliseconds / 1000)
             elif self._motor.status.settled_at() > self._timeline.now:
@@ -116,14 +116,14 @@ class ProgramCommands:
     def _input_variable(self, statement: Statement) -> Action:
         """IV: the next number that comes goes to a variable (manual 5.1.68)."""
         target, more = pair(statement)
-        if not isinstance(target, Name) or more is not None:
-            raise Fault(E.ILLEGAL_DATA)
+        if not isinstance(target, NameTerm) or more is not None:
+            raise DriveFault(E.ILLEGAL_DATA)
         word = target.word
         self._variables.writer(word)
 
         def wait() -> None:
             if self._memory.awaited:
-                raise Fault(E.INPUT_PENDING)
+                raise DriveFault(E.INPUT_PENDING)
             self._memory.await_input(word)
 
         return wait
@@ -132,7 +132,7 @@ class ProgramCommands:
         """A bare number: what IV waits for, or with NE=1 another move of the last kind (manual 5.1.68, 5.1.89)."""
         figure, memory, motor = statement.arguments[0], self._memory, self._motor
         if not isinstance(figure, Number):
-            raise Fault(E.UNKNOWN_COMMAND)
+            raise DriveFault(E.UNKNOWN_COMMAND)
         read = self._variables.value(figure)
 
         def take() -> None:
@@ -148,7 +148,7 @@ class ProgramCommands:
                     motor.axis.go(kind, value, t)
                 self._timeline.replan()
             else:
-                raise Fault(E.UNKNOWN_COMMAND)
+                raise DriveFault(E.UNKNOWN_COMMAND)
 
         return take
 
@@ -159,15 +159,15 @@ class ProgramCommands:
         if isinstance(target, Compare) and target.op == "=":
             read = self._variables.value(target.right)
             target = target.left
-        if not isinstance(target, Name):
-            raise Fault(E.ILLEGAL_DATA)
+        if not isinstance(target, NameTerm):
+            raise DriveFault(E.ILLEGAL_DATA)
         word = target.word
         self._mode.check_new(word)
 
         def make() -> None:
             scope = "G" if self._printer.immediate else "L"
             if word in self._program.labels or memory.scopes.get(word, "L") != "L":
-                raise Fault(E.NAME_EXISTS)
+                raise DriveFault(E.NAME_EXISTS)
             value = within(whole(read()), -0x80000000, 0x7FFFFFFF)
             if word not in memory.scopes:
                 self._mode.check_room()
@@ -180,14 +180,14 @@ class ProgramCommands:
     def _check_unlocked(self) -> None:
         """Raise Fault (44) while the program is locked (manual 5.1.75)."""
         if self._memory.values["LK"]:
-            raise Fault(E.PROGRAM_LOCKED)
+            raise DriveFault(E.PROGRAM_LOCKED)
 
     def _check_idle(self, moving: E) -> None:
         """Raise Fault (41) while a program runs, and the given one while the motor moves."""
         if self._thread.running:
-            raise Fault(E.PROGRAM_RUNNING)
+            raise DriveFault(E.PROGRAM_RUNNING)
         if self._motor.status.moving(self._timeline.now):
-            raise Fault(moving)
+            raise DriveFault(moving)
 
     def _execute(self, statement: Statement) -> Action:
         """EX (manual 5.1.42)."""
@@ -197,11 +197,11 @@ class ProgramCommands:
         def start() -> None:
             mode = whole(read())
             if mode not in (0, 1, 2):
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             if mode:  # which shows the program line by line, and so lists it
                 self._check_unlocked()
-            if isinstance(target, Name) and target.word in self._memory.scopes:
-                raise Fault(E.NOT_EXECUTABLE)
+            if isinstance(target, NameTerm) and target.word in self._memory.scopes:
+                raise DriveFault(E.NOT_EXECUTABLE)
             self._interpreter.start(target, self._timeline.now, mode)
 
         return start
@@ -209,11 +209,11 @@ class ProgramCommands:
     def _listing(self, statement: Statement) -> Action:
         """L (manual 5.1.70)."""
         if len(statement.arguments) > 1:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
 
         def show() -> None:
             self._check_unlocked()
-            start = self._program.resolve(statement.arguments[0]) if statement.arguments else FIRST
+            start = self._program.resolve(statement.arguments[0]) if statement.arguments else FIRST_ADDRESS
             for row in self._program.listing(start):
                 self._printer.emit(row + CRLF)
 
@@ -221,27 +221,27 @@ class ProgramCommands:
 
     def _label(self, statement: Statement) -> Action:
         """LB: a mark, which takes no time. Its name is entered when the line is stored."""
-        if len(statement.arguments) != 1 or not isinstance(statement.arguments[0], Name) or statement.equals:
-            raise Fault(E.ILLEGAL_DATA)
+        if len(statement.arguments) != 1 or not isinstance(statement.arguments[0], NameTerm) or statement.equals:
+            raise DriveFault(E.ILLEGAL_DATA)
         return lambda: None
 
     def _program_mode(self, statement: Statement) -> Action:
         """PG with an address; without one it ends program mode, which is not on here (manual 5.1.98)."""
         if len(statement.arguments) > 1:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
 
         def enter() -> None:
             if not statement.arguments:
-                raise Fault(E.NOT_IN_PROGRAM_MODE)
+                raise DriveFault(E.NOT_IN_PROGRAM_MODE)
             self._check_idle(E.MOVING_SAVE)
             self._check_unlocked()
             target = statement.arguments[0]
-            if isinstance(target, Name):
+            if isinstance(target, NameTerm):
                 self._mode.address = self._program.resolve(target)
             elif isinstance(target, Number) and isinstance(target.value, int) and target.value in ADDRESSES:
                 self._mode.address = target.value
             else:
-                raise Fault(E.NO_SUCH_ADDRESS)
+                raise DriveFault(E.NO_SUCH_ADDRESS)
 
         return enter
 
@@ -249,7 +249,7 @@ class ProgramCommands:
         """OE; 0 or nothing takes the handler away (manual 5.1.91)."""
         target = statement.arguments[0] if statement.arguments else Number(0)
         if len(statement.arguments) > 1 or not is_place(target):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
 
         def declare() -> None:
             if target == Number(0):
@@ -272,16 +272,16 @@ class ProgramCommands:
             return break_here
         target, count = pair(statement)
         if not is_place(target):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         place = None if target == Number(0) else target
         if count is None and place is not None and not breaks_here:
-            raise Fault(E.NO_SEPARATOR)
+            raise DriveFault(E.NO_SEPARATOR)
         read = self._variables.value(count or Number(1))
 
         def set_up() -> None:
             passes = whole(read())
             if not 1 <= passes <= MOST_PASSES:
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             if place is not None:
                 self._check_unlocked()
             self._interpreter.break_at(place, passes)
@@ -293,12 +293,12 @@ class ProgramCommands:
     def _clear(self, statement: Statement) -> Action:
         memory, arguments, takes_option = self._memory, statement.arguments, self._memory.model.clears_variables
         if len(arguments) > (2 if takes_option else 1):
-            raise Fault(E.ILLEGAL_DATA)
-        saves = arguments == (Name("S"),) and takes_option
+            raise DriveFault(E.ILLEGAL_DATA)
+        saves = arguments == (NameTerm("S"),) and takes_option
         all_of_it = len(arguments) == 1 and arguments[0] in OPTIONS and takes_option
         option = arguments[0] if all_of_it or len(arguments) == 2 else Number(0)
         if option not in OPTIONS:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         target = None if saves or all_of_it or not arguments else arguments[-1]
 
         def clear() -> None:
@@ -308,8 +308,10 @@ class ProgramCommands:
             if target is None:
                 memory.values["LK"] = 0
             self._check_unlocked()
-            everything = target is None or target == Number(FIRST)  # the beginning is there in an empty memory too
-            self._program.clear(FIRST if everything else self._program.resolve(target))
+            everything = target is None or target == Number(
+                FIRST_ADDRESS
+            )  # the beginning is there in an empty memory too
+            self._program.clear(FIRST_ADDRESS if everything else self._program.resolve(target))
             self._interpreter.linked.forget()
             if target is None and memory.model.clear_ends_handler:
                 self._interpreter.handler = None

@@ -12,10 +12,10 @@ from functools import partial
 from math import inf
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Argument, Compare, Name, Number, Statement, Text
+from multidrop.families.lexium.manual.grammar import Argument, Compare, NameTerm, Number, Statement, Text
 from multidrop.families.lexium.manual.groups import BANKED, TRIPS, TRIPS_WITH_VALUE
 from multidrop.families.lexium.simulator.event_loop import EventLoop
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.expressions import PI, Compiler, Read, Value, whole
 from multidrop.families.lexium.simulator.state.memory import slot, within
 from multidrop.families.lexium.simulator.state.program_memory import Action
@@ -37,20 +37,20 @@ Compile = Callable[[Statement], Action]
 
 
 def is_place(argument: Argument | None) -> bool:
-    return isinstance(argument, (Name, Number))
+    return isinstance(argument, (NameTerm, Number))
 
 
 def only(statement: Statement) -> Argument | None:
     """The one argument. Raises Fault (24) for none or several."""
     if len(statement.arguments) != 1:
-        raise Fault(E.ILLEGAL_DATA)
+        raise DriveFault(E.ILLEGAL_DATA)
     return statement.arguments[0]
 
 
 def pair(statement: Statement) -> tuple[Argument | None, Argument | None]:
     """One or two arguments. Raises Fault (24)."""
     if not 1 <= len(statement.arguments) <= 2:
-        raise Fault(E.ILLEGAL_DATA)
+        raise DriveFault(E.ILLEGAL_DATA)
     first, second = (*statement.arguments, None)[:2]
     return first, second
 
@@ -60,19 +60,19 @@ def bare(action: Action) -> Compile:
 
     def compiler(statement: Statement) -> Action:
         if statement.arguments or statement.equals:
-            raise Fault(E.INSTRUCTION_NOT_SETTABLE if statement.equals else E.ILLEGAL_DATA)
+            raise DriveFault(E.INSTRUCTION_NOT_SETTABLE if statement.equals else E.ILLEGAL_DATA)
         return action
 
     return compiler
 
 
-def missing(statement: Statement) -> Fault:
+def missing(statement: Statement) -> DriveFault:
     """The error of an instruction that lacks its arguments."""
-    return Fault(E.ILLEGAL_DATA if statement.equals else E.NOT_EXECUTABLE)
+    return DriveFault(E.ILLEGAL_DATA if statement.equals else E.NOT_EXECUTABLE)
 
 
 def _unreadable() -> Value:
-    raise Fault(E.NOT_PRINTABLE)
+    raise DriveFault(E.NOT_PRINTABLE)
 
 
 class Variables:
@@ -172,15 +172,15 @@ class Variables:
             return self._readers[word]
         values, key = self._values, word if row else slot(word)
         if row is not None and row.kind == "reserved":
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         if row is not None and (word not in values or row.access == "WO"):
-            raise Fault(E.NOT_PRINTABLE)
+            raise DriveFault(E.NOT_PRINTABLE)
 
         def read() -> Value:
             try:
                 return values[key]
             except KeyError:
-                raise Fault(E.NO_SUCH_NAME) from None
+                raise DriveFault(E.NO_SUCH_NAME) from None
 
         return read
 
@@ -192,9 +192,9 @@ class Variables:
         if word in self._writers:
             return self._writers[word]
         if row.access in ("RO", "RC") or row.kind in ("keyword", "math"):
-            raise Fault(E.READ_ONLY)
+            raise DriveFault(E.READ_ONLY)
         if word not in values:
-            raise Fault(E.UNKNOWN_VARIABLE)
+            raise DriveFault(E.UNKNOWN_VARIABLE)
         if row.low_encoder is not None or row.values:
             return partial(self._take, word, partial(values.__setitem__, word))
         low, high = row.low or 0, row.high or 0
@@ -209,7 +209,7 @@ class Variables:
             if not isinstance(value, int):
                 value = whole(value)
             if not low <= value <= high:
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             values[word] = value
 
         return write
@@ -217,13 +217,13 @@ class Variables:
     def _user_writer(self, word: str) -> Write:
         values, key = self._values, slot(word)
         if word in self._program.labels:
-            raise Fault(E.LABEL_NOT_SETTABLE)
+            raise DriveFault(E.LABEL_NOT_SETTABLE)
         if not self.declared(word):
-            raise Fault(E.UNKNOWN_VARIABLE)
+            raise DriveFault(E.UNKNOWN_VARIABLE)
 
         def write(value: Value) -> None:
             if key not in values:
-                raise Fault(E.UNKNOWN_VARIABLE)
+                raise DriveFault(E.UNKNOWN_VARIABLE)
             values[key] = within(whole(value), -0x80000000, 0x7FFFFFFF)
 
         return write
@@ -237,9 +237,9 @@ class Variables:
     def value(self, argument: Argument | None, floating: bool = False) -> Read:
         """Return a closure that reads an argument's value. Raises Fault (21, 24) for what has none."""
         if isinstance(argument, Text):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if argument is None or isinstance(argument, Compare):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         return self.compiler.expression(argument, floating)
 
     def numbers(self, act: Callable[[list[int]], None], least: int, most: int) -> Compile:
@@ -250,10 +250,10 @@ class Variables:
             if not count:
                 raise missing(statement)
             if count < least:
-                raise Fault(E.NO_SEPARATOR)
+                raise DriveFault(E.NO_SEPARATOR)
             if count > most:
-                raise Fault(E.ILLEGAL_DATA)
-            reads = [self.value(each) for each in statement.arguments]
+                raise DriveFault(E.ILLEGAL_DATA)
+            reads = [self.value(argument) for argument in statement.arguments]
             return lambda: act([whole(read()) for read in reads])
 
         return compiler
@@ -276,16 +276,16 @@ class Variables:
         if not self._memory.counting:
             self._check_resolution(number)
         if name == "VI" and number >= values["VM"]:
-            raise Fault(E.VI_NOT_BELOW_VM)
+            raise DriveFault(E.VI_NOT_BELOW_VM)
         if name == "VM" and number <= values["VI"]:
-            raise Fault(E.VM_NOT_ABOVE_VI)
+            raise DriveFault(E.VM_NOT_ABOVE_VI)
         values[name] = number
 
     def _check_resolution(self, velocity: int) -> None:
         """Raise Fault (77) for what this resolution does not reach, on products that have such a bound."""
         fastest = self._memory.model.per_microstep
         if fastest and velocity > self._values["MS"] * fastest:
-            raise Fault(E.VELOCITY_TOO_HIGH)
+            raise DriveFault(E.VELOCITY_TOO_HIGH)
 
     def _set_ts(self, number: int) -> None:
         self._check_resolution(number)
@@ -298,11 +298,11 @@ class Variables:
         """
         memory, values, steps, words = self._memory, self._values, self._memory.steps, self._memory.words
         if memory.counting and not memory.model.free_ms and number != values["MS"]:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if memory.counting:
             self._check_ratio({"MS": number})
         if values.get("AS") and number < LEAST_MS:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         ratio = number / values["MS"]
         for name in BANKED:
             low, high = words[name].bounds()
@@ -319,13 +319,13 @@ class Variables:
         """
         new = {**self._values, **changed}
         if self._memory.model.free_ms and new["MS"] * round(360 / new["SA"]) < new["EL"] * 8:
-            raise Fault(E.ENCODER_RATIO)
+            raise DriveFault(E.ENCODER_RATIO)
 
     def _write_geometry(self, name: str, value: Value) -> None:
         """EL and SA: what a step and a count are, which are not changed on the move."""
         row, change = self._memory.row(name), {name: value if name == "SA" else whole(value)}
         if row is None or not row.accepts(change[name]) or self._moving():
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if self._values.get("EE"):
             self._check_ratio(change)
         self._motor.axis.rescale(lambda: self._values.update(change), self._timeline.now)
@@ -333,7 +333,7 @@ class Variables:
 
     def _set_rd(self, number: int) -> None:
         if self._moving():
-            raise Fault(E.DIRECTION_WHILE_MOVING)
+            raise DriveFault(E.DIRECTION_WHILE_MOVING)
         self._values["RD"] = number
         self._motor.axis.orient(self._timeline.now)
 
@@ -349,7 +349,7 @@ class Variables:
             self._check_ratio({})
             # Check that VI is a count or more, on a product that has a code for less (5-21, 9). Raises Fault (90).
             if memory.model.per_microstep is None and self._values["VI"] < memory.steps_per_count:
-                raise Fault(E.VELOCITY_TOO_LOW)
+                raise DriveFault(E.VELOCITY_TOO_LOW)
         self._motor.limit_stop.relocate(lambda: self._motor.axis.switch_unit("EE", number, t), t)
         self._timeline.replan()
 
@@ -365,7 +365,7 @@ class Variables:
 
     def _set_as(self, number: int) -> None:
         if number and self._memory.steps["MS"] < LEAST_MS:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         self._motor.hmt.set_mode(number, self._timeline.now)
         self._motor.hmt.tune()
 
@@ -373,7 +373,7 @@ class Variables:
         """Up to VM, in steps/s whatever the unit of motion is now."""
         row, number = self._memory.row("MF"), whole(value)
         if row is None or not row.accepts(number) or number > self._memory.steps["VM"]:
-            raise Fault(E.MAKE_UP_FREQUENCY)
+            raise DriveFault(E.MAKE_UP_FREQUENCY)
         self._values["MF"] = number
 
     # Counters, delays, points, the program and the port.
@@ -387,7 +387,7 @@ class Variables:
     def _set_delay(self, other: str, name: str, number: int) -> None:
         """HT or MT, which together may not be more than 65535 (manual 5.1.86)."""
         if number + self._values[other] > MOST_DELAY:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         self._set(name, number)
 
     def _set_error(self, number: int) -> None:
@@ -402,20 +402,20 @@ class Variables:
     def _set_lock(self, number: int) -> None:
         """A lock that has been saved is opened by CP or FD only (manual 5.1.75)."""
         if not number and self._values["LK"] and self._nvm.locked:
-            raise Fault(E.PROGRAM_LOCKED)
+            raise DriveFault(E.PROGRAM_LOCKED)
         self._values["LK"] = number
 
     def _write_baud(self, value: Value) -> None:
         row, number = self._memory.row("BD"), whole(value)
         if row is None or not row.accepts(number):
-            raise Fault(E.NO_SUCH_BAUD)
+            raise DriveFault(E.NO_SUCH_BAUD)
         self._values["BD"] = number
 
     def _set_fl(self, number: int) -> None:
         """Following wants inputs 3 and 4 to be a clock; they are so together (manual 5.1.46)."""
         points = self._inputs.points
         if number and self._inputs.types[points.clocks[0]][0] not in points.clock_types:
-            raise Fault(E.WRONG_CLOCK_TYPE)
+            raise DriveFault(E.WRONG_CLOCK_TYPE)
         self._set("FL", number)
 
     def _set_je(self, number: int) -> None:

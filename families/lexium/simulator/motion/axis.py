@@ -14,11 +14,11 @@ from typing import Protocol
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.simulator.motion.counters import Counters
-from multidrop.families.lexium.simulator.motion.rotor import CATCHING, Rotor
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.motion.rotor import CATCHING, LexiumRotor
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.expressions import Value
 from multidrop.families.lexium.simulator.state.memory import Memory
-from multidrop.simulator.kinematics import LINE, LINEAR, Pace, Profile, Shape, halt, move, slew
+from multidrop.simulator.kinematics import LINE, LINEAR, MotionPace, Profile, Shape, halt, move, slew
 
 
 class Bridges:
@@ -46,9 +46,9 @@ class Bridges:
     def check(self) -> None:
         """Check that a motion may be commanded at all. Raises Fault (94, 96)."""
         if self.locked or not (self.enabled or self.count_when_disabled):
-            raise Fault(E.DRIVE_DISABLED)
+            raise DriveFault(E.DRIVE_DISABLED)
         if not self.supply:
-            raise Fault(E.NO_MOTOR_VOLTAGE)
+            raise DriveFault(E.NO_MOTOR_VOLTAGE)
 
 
 STEEPEST = 1.1e9
@@ -127,7 +127,7 @@ class Axis:
     when a motion that runs on passes its target (infinite: never), `back` the steps that follow the motion (BM=1).
     """
 
-    def __init__(self, memory: Memory, rotor: Rotor, counters: Counters, supervisor: Supervisor) -> None:
+    def __init__(self, memory: Memory, rotor: LexiumRotor, counters: Counters, supervisor: Supervisor) -> None:
         self._memory, self._supervisor = memory, supervisor
         self.rotor, self.counters, self.bridges = rotor, counters, Bridges(memory)
         self.status = MotionStatus(self, memory, supervisor)
@@ -172,12 +172,12 @@ class Axis:
         """Carry out MA or MR. `announce`: send the name when it is over; `run_on`: do not stop there. Raises Fault."""
         counters = self.counters
         if not -0x80000000 <= value <= 0x7FFFFFFF:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         distance = value - counters.position(t) if kind == "MA" else value
         here, raw = self.profile.position(t), counters.raw(counters.source, t)
         self._ready(t, distance)
         if self.kind == CORRECTION and self.commanded(t):
-            raise Fault(E.STILL_CORRECTING)
+            raise DriveFault(E.STILL_CORRECTING)
         velocity, pace = self.profile.velocity(t), self._pace()
         if self.kind in (SLEW, HOMING, TORQUE):
             self.backlash.flank = int(self.direction(t))
@@ -200,9 +200,9 @@ class Axis:
         """Carry out SL: turn at a velocity, or slow down and stop. Raises Fault."""
         counting, fastest = self._memory.counting, self._memory.model.per_microstep
         if abs(value) > (FASTEST_COUNTS if counting else FASTEST_STEPS):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if fastest and not counting and abs(value) > self._memory.values["MS"] * fastest:
-            raise Fault(E.VELOCITY_TOO_HIGH)
+            raise DriveFault(E.VELOCITY_TOO_HIGH)
         if value:
             self._ready(t, value)
         self.slow_to(value * self._memory.scale, t, stopping=not value and self.kind in MOVES)
@@ -222,7 +222,7 @@ class Axis:
     def correct(self, distance: float, t: float) -> None:
         """Go back to where the last motion should have ended: at VI, without ramps (PM)."""
         here, vi = self.profile.position(t), self._memory.values["VI"] * self._memory.scale
-        self.begin(CORRECTION, move(t, here, 0.0, here + distance, Pace(vi, vi, 1.0, 1.0)), t)
+        self.begin(CORRECTION, move(t, here, 0.0, here + distance, MotionPace(vi, vi, 1.0, 1.0)), t)
 
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
@@ -328,7 +328,7 @@ class Axis:
         self.bridges.check()
         code = self._supervisor.refuse(t, direction)
         if code:
-            raise Fault(code)
+            raise DriveFault(code)
 
     def check_ramps(self) -> None:
         """Check that a motion may begin with these S-curves. Raises Fault (98, 99) for too steep a middle."""
@@ -337,9 +337,9 @@ class Axis:
             return
         for shape, rate, code in (("AT", "A", E.NO_ACCELERATION_FITS), ("DT", "D", E.NO_DECELERATION_FITS)):
             if self._shape(shape, rate) is None:
-                raise Fault(code)
+                raise DriveFault(code)
 
-    def _pace(self) -> Pace:
+    def _pace(self) -> MotionPace:
         """VI, VM, A and D in steps (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30) with both ramps.
 
         They are straight where a curve would be too steep, as a stop is never refused.
@@ -347,7 +347,7 @@ class Axis:
         values, scale = self._memory.values, self._memory.scale
         up, down = self._shape("AT", "A") or LINE, self._shape("DT", "D") or LINE
         vi, vm, a, d = (values[word] * scale for word in ("VI", "VM", "A", "D"))
-        return Pace(vi, vm, a, d, up, down)
+        return MotionPace(vi, vm, a, d, up, down)
 
     def _shape(self, kind: str, rate: str) -> Shape | None:
         """Make a shape of AT and AJ, or DT and DJ; None where the middle of the ramp would be too steep."""
@@ -360,7 +360,7 @@ class Axis:
     def _ready(self, t: float, direction: float) -> None:
         """Check that a motion may begin at all. Raises Fault."""
         if self._supervisor.homing_active or (self._stopping and self.commanded(t)):
-            raise Fault(E.HOMING_OR_MOVING)
+            raise DriveFault(E.HOMING_OR_MOVING)
         self.allow(t, direction)
         self.check_ramps()
 

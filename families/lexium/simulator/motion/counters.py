@@ -16,8 +16,8 @@ from math import floor, inf, nextafter
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.manual.groups import TRIPS
 from multidrop.families.lexium.simulator.motion.inputs import MINUS, PLUS, Inputs
-from multidrop.families.lexium.simulator.motion.rotor import Rotor
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.motion.rotor import LexiumRotor
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.expressions import wrap
 from multidrop.families.lexium.simulator.state.interpreter import Core
 from multidrop.families.lexium.simulator.state.memory import Memory, Trip
@@ -30,7 +30,7 @@ TURNOVER = 2**32
 class Counters:
     """The counters of one drive, and where P is for trips and limits."""
 
-    def __init__(self, memory: Memory, rotor: Rotor) -> None:
+    def __init__(self, memory: Memory, rotor: LexiumRotor) -> None:
         self._memory, self._rotor = memory, rotor
         self._offsets = {"C1": 0, "C2": 0}
         self._base = (0.0, 0.0)
@@ -119,7 +119,7 @@ FRESH = {0: (0, 0), 1: (0, 0)}
 """LS from the factory: position and whether it is enabled."""
 
 
-class Limits:
+class DriveLimits:
     """The limits of one drive. A limit acts on motion in its own direction only, which it refuses while it is active.
 
     `homing.LimitStop` ends the motion that reaches one, as LM says. `switches` are the directions of limit switches
@@ -211,11 +211,11 @@ class Trips:
     def arm(self, bits: int, t: float) -> None:
         """Set TE. Raises Fault (12, 27, 39)."""
         if any(bits & bit and bit not in self.defined for bit in TRIPS.values()):
-            raise Fault(E.TRIP_NOT_SET_UP)
+            raise DriveFault(E.TRIP_NOT_SET_UP)
         if bits & POSITION and bits & RELATIVE:
-            raise Fault(E.TRIPS_EXCLUSIVE)
+            raise DriveFault(E.TRIPS_EXCLUSIVE)
         if bits & CAPTURE and not self._inputs.has(self._inputs.points.capture):
-            raise Fault(E.NOT_CAPTURE_INPUT)
+            raise DriveFault(E.NOT_CAPTURE_INPUT)
         fresh = bits & ~self.armed
         if fresh & TIME:
             self._armed_at = t
@@ -230,17 +230,17 @@ class Trips:
 
     def next(self, t: float) -> tuple[float, int]:
         """When the next trip happens by itself, and which; infinite if none does."""
-        found = (inf, 0)
+        soonest = (inf, 0)
         armed, counters = self.armed, self._counters
         if not armed:
-            return found
+            return soonest
         if armed & POSITION and self._on_steps:
-            found = min(found, (counters.reaching_steps(self.defined[POSITION].value, t), POSITION))
+            soonest = min(soonest, (counters.reaching_steps(self.defined[POSITION].value, t), POSITION))
         for bit, place in self._places(t):
-            found = min(found, (counters.passing(place, t), bit))
+            soonest = min(soonest, (counters.passing(place, t), bit))
         if armed & TIME:
-            found = min(found, (max(self._armed_at + self.defined[TIME].value / 1000, t), TIME))
-        return found
+            soonest = min(soonest, (max(self._armed_at + self.defined[TIME].value / 1000, t), TIME))
+        return soonest
 
     def displaced(self, was: float, here: float, t: float) -> None:
         """Let the trips happen, each once, between two places from one of which P has come to the other at once."""
@@ -251,13 +251,13 @@ class Trips:
 
     def _places(self, t: float) -> list[tuple[int, float]]:
         """Where P meets the armed trips on position."""
-        found = []
+        places = []
         if self.armed & POSITION and not self._on_steps:
-            found += [(POSITION, place) for place in self._counters.places_of(self.defined[POSITION].value, t)]
+            places += [(POSITION, place) for place in self._counters.places_of(self.defined[POSITION].value, t)]
         if self.armed & RELATIVE:
             distance = abs(self.defined[RELATIVE].value) * self._memory.scale
-            found += [(RELATIVE, self._base - distance), (RELATIVE, self._base + distance)]
-        return found
+            places += [(RELATIVE, self._base - distance), (RELATIVE, self._base + distance)]
+        return places
 
     @property
     def _on_steps(self) -> bool:

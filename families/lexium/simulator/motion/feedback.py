@@ -25,9 +25,9 @@ from math import inf
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.simulator.motion.axis import CORRECTION, MOVES, TORQUE, Axis
-from multidrop.families.lexium.simulator.motion.counters import Limits, Trips
+from multidrop.families.lexium.simulator.motion.counters import DriveLimits, Trips
 from multidrop.families.lexium.simulator.motion.rotor import FOLLOWING, STANDING
-from multidrop.families.lexium.simulator.state.errors import Event, Fault, nothing, when
+from multidrop.families.lexium.simulator.state.errors import DriveFault, Event, nothing, when
 from multidrop.families.lexium.simulator.state.interpreter import Core
 from multidrop.simulator.kinematics import halt, meeting
 from multidrop.simulator.world import TOUCH
@@ -39,7 +39,7 @@ NEAR = 1e-3
 class Encoder:
     """The encoder functions of one drive."""
 
-    def __init__(self, core: Core, axis: Axis, limits: Limits, stop: Callable[[float], None]) -> None:
+    def __init__(self, core: Core, axis: Axis, limits: DriveLimits, stop: Callable[[float], None]) -> None:
         self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
         self._axis, self._limits, self._interpreter, self._stop = axis, limits, core.interpreter, stop
         self._stalled = False
@@ -137,10 +137,10 @@ FIXED, VARIABLE, TORQUE_MODE = 1, 2, 3
 """Values of AS."""
 
 
-class Torque:
+class TorqueMode:
     """Torque mode of one drive. `halted`: a stop lets it stand until AS is set again, a pause until it goes on."""
 
-    def __init__(self, core: Core, axis: Axis, limits: Limits) -> None:
+    def __init__(self, core: Core, axis: Axis, limits: DriveLimits) -> None:
         self._values, self._timeline, self._world = core.values, core.timeline, core.world
         self._axis, self._limits = axis, limits
         self.halted = False
@@ -196,7 +196,7 @@ MOST_LAG = 0x7FFFFFFF
 class Hmt:
     """hMT of one drive; in force on products that have AS."""
 
-    def __init__(self, core: Core, axis: Axis, torque: Torque, trips: Trips, stop: Callable[[float], None]) -> None:
+    def __init__(self, core: Core, axis: Axis, torque: TorqueMode, trips: Trips, stop: Callable[[float], None]) -> None:
         self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
         self._axis, self._rotor, self._bridges, self._torque = axis, axis.rotor, axis.bridges, torque
         self._trips, self._interpreter, self._stop = trips, core.interpreter, stop
@@ -260,7 +260,7 @@ class Hmt:
         """Set CB. Raises Fault (21) for another one than there is in torque mode."""
         if self._torque.active:
             if mode:
-                raise Fault(E.OUT_OF_RANGE)
+                raise DriveFault(E.OUT_OF_RANGE)
             return
         self._values["CB"] = mode
         self._timeline.replan()
@@ -269,10 +269,10 @@ class Hmt:
         """Set AS. Raises Fault (87, 109): torque mode turns until SL 0 or another stop."""
         was = self.mode
         if self._axis.status.moving(t):
-            raise Fault(E.AS_WHILE_MOVING)
+            raise DriveFault(E.AS_WHILE_MOVING)
         if mode and not self._bridges.enabled:
             self._failed = True
-            raise Fault(E.CALIBRATION_FAILED)
+            raise DriveFault(E.CALIBRATION_FAILED)
         self._axis.switch_unit("AS", mode, t)
         self._torque.halted = self._failed = False
         self._timeline.replan()
@@ -306,7 +306,7 @@ class Hmt:
     def make_up(self, mode: int, clearing: int, t: float) -> None:
         """Set MU. Raises Fault (110) in torque mode."""
         if self._torque.active:
-            raise Fault(E.MAKE_UP_OFF)
+            raise DriveFault(E.MAKE_UP_OFF)
         self._values["MU"] = mode
         if clearing:
             self._rotor.release(t)
@@ -352,12 +352,12 @@ class Hmt:
             return inf, nothing
         reported = self._bridges.locked or (self._values["LR"] and self._torque.active)
         locks_at = inf if reported else self._held_since + self._values["LT"] / 1000
-        found = [(self._ready_at, self._calibrated), (locks_at, self._lock)]
+        events = [(self._ready_at, self._calibrated), (locks_at, self._lock)]
         if self.closed and self._rotor.state != FOLLOWING:
             levels = (self._memory.bound, float(self._values["LG"]), float(self._values["LD"]))
-            found += [(self._lags_at(limit, t), nothing) for limit in levels]
-            found.append((self._axis.profile.turning(-self._axis.direction(t), t), nothing))
-        return min(found, key=when)
+            events += [(self._lags_at(limit, t), nothing) for limit in levels]
+            events.append((self._axis.profile.turning(-self._axis.direction(t), t), nothing))
+        return min(events, key=when)
 
     def _lags_at(self, limit: float, t: float) -> float:
         """When the command gets a distance away from the rotor, either way, if it is not as far away now."""

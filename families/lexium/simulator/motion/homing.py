@@ -16,11 +16,11 @@ from math import inf
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.simulator.motion.axis import HOMING, TORQUE, Axis
-from multidrop.families.lexium.simulator.motion.counters import DIRECTIONS, ERRORS, Limits
+from multidrop.families.lexium.simulator.motion.counters import DIRECTIONS, ERRORS, DriveLimits
 from multidrop.families.lexium.simulator.motion.inputs import HOME, Inputs
-from multidrop.families.lexium.simulator.state.errors import Event, Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault, Event
 from multidrop.families.lexium.simulator.state.interpreter import Core
-from multidrop.simulator.kinematics import Pace, slew
+from multidrop.simulator.kinematics import MotionPace, slew
 from multidrop.simulator.world import TOUCH
 
 SEEK, BRAKE, TURN, APPROACH = "seek", "brake", "turn", "approach"
@@ -30,10 +30,10 @@ WITHOUT_RAMP, TURNS_ROUND = (4, 5, 6), (1, 4)
 """Values of LM."""
 
 
-class Homing:
+class LexiumHoming:
     """The homing of one drive. `phase` is empty while there is none."""
 
-    def __init__(self, core: Core, axis: Axis, inputs: Inputs, limits: Limits) -> None:
+    def __init__(self, core: Core, axis: Axis, inputs: Inputs, limits: DriveLimits) -> None:
         self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
         self._axis, self._inputs, self._limits, self._interpreter = axis, inputs, limits, core.interpreter
         self.phase = ""
@@ -47,12 +47,12 @@ class Homing:
     def start(self, word: str, kind: int, t: float) -> None:
         """Begin HM, HI or HF. Raises Fault (80, 81, 83, 84, 85, 94, 96)."""
         if kind not in TYPES:
-            raise Fault(E.NO_HOMING_TYPE)
+            raise DriveFault(E.NO_HOMING_TYPE)
         self._axis.bridges.check()
         if word == "HM" and not self._inputs.has(HOME):
-            raise Fault(E.NO_HOME_INPUT)
+            raise DriveFault(E.NO_HOME_INPUT)
         if self._axis.status.moving(t):
-            raise Fault(E.HOMING_OR_MOVING)
+            raise DriveFault(E.HOMING_OR_MOVING)
         seek, approach = TYPES[kind]
         begun = word == "HM" and self._at_switch()
         self._set_out(word, (seek, approach), set(), 0 if begun else seek, t)
@@ -63,7 +63,7 @@ class Homing:
         """Seek in a direction, 0 where it has found already, or turn round at once. Raises Fault (82 to 85, 94, 96)."""
         blocked = direction and self._values["LM"] in TURNS_ROUND and self._limits.refuse(t, direction)
         if blocked and met:
-            raise Fault(E.NO_HOME_SWITCH)
+            raise DriveFault(E.NO_HOME_SWITCH)
         there = -direction if blocked else direction
         self._axis.allow(t, there or directions[1])
         self._axis.check_ramps()
@@ -84,11 +84,11 @@ class Homing:
         approaches, braked = self.phase in (BRAKE, APPROACH), self.phase == BRAKE
 
         def go_on(t: float) -> None:
-            found = approaches or (word == "HM" and self._at_switch())
-            self._set_out(word, directions, met, 0 if found else direction, t)
+            again = approaches or (word == "HM" and self._at_switch())
+            self._set_out(word, directions, met, 0 if again else direction, t)
             if braked:
                 self._leave(t)
-            elif found:
+            elif again:
                 self._approach(t)
 
         return go_on
@@ -162,7 +162,7 @@ class Homing:
     def _approach(self, t: float) -> None:
         self.phase = APPROACH
         here, direction, vi = self._axis.position(t), self._directions[1], self._values["VI"] * self._memory.scale
-        self._axis.begin(HOMING, slew(t, here, 0.0, direction * vi, Pace(vi, vi, 1.0, 1.0)), t)
+        self._axis.begin(HOMING, slew(t, here, 0.0, direction * vi, MotionPace(vi, vi, 1.0, 1.0)), t)
         self._set_mark(direction, t)
 
     def _set_mark(self, direction: int, t: float) -> None:
@@ -209,7 +209,7 @@ WITH_PROGRAM = (3, 6)
 class LimitStop:
     """The stop at a limit, of one drive."""
 
-    def __init__(self, core: Core, axis: Axis, inputs: Inputs, limits: Limits, homing: Homing) -> None:
+    def __init__(self, core: Core, axis: Axis, inputs: Inputs, limits: DriveLimits, homing: LexiumHoming) -> None:
         self._values, self._timeline, self._thread = core.values, core.timeline, core.thread
         self._axis, self._inputs, self._limits, self._homing = axis, inputs, limits, homing
         self._interpreter = core.interpreter

@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.simulator.motion.rotor import Rotor
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.motion.rotor import LexiumRotor
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.interpreter import Core
 from multidrop.families.lexium.simulator.state.models import STEP_DIRECTION, UP_DOWN
 
@@ -36,7 +36,7 @@ class Inputs:
     `put_out` gives the level of a point that is an output, None for an input.
     """
 
-    def __init__(self, core: Core, rotor: Rotor) -> None:
+    def __init__(self, core: Core, rotor: LexiumRotor) -> None:
         self._values, self._world, self._rotor = core.values, core.world, rotor
         self.points = core.model.points
         self.numbers = self.points.inputs
@@ -63,20 +63,20 @@ class Inputs:
         """Carry out IS, or S<n> of an input. Raises Fault (6, 8, 10, 21, 24)."""
         n, *rest = values
         if n not in self.types:
-            raise Fault(E.NO_SUCH_POINT)
+            raise DriveFault(E.NO_SUCH_POINT)
         if n not in self.points.input_types:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         if n == INDEX and len(rest) == 1:
             rest = [0, *rest]
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
         if len(rest) > 2 or active not in (0, 1):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if kind not in self.points.input_types[n]:
-            raise Fault(E.WRONG_POINT_TYPE)
+            raise DriveFault(E.WRONG_POINT_TYPE)
         clocks = self.points.clock_types
         several = kind in (GENERAL, *clocks)
         if not several and any(self.types[k][0] == kind for k in self.numbers if k != n):
-            raise Fault(E.TYPE_IN_USE)
+            raise DriveFault(E.TYPE_IN_USE)
         self.types[n] = (kind, active)
         if n in self.points.clocks:  # both inputs of a clock have one type; the other of a former clock becomes free
             other = sum(self.points.clocks) - n
@@ -173,15 +173,15 @@ class Inputs:
         driven, closed = self._world.driven(t), None
         levels = []
         for n in self.numbers:
-            each = self.types[n]
-            kind, idle = each[0], 1 - each[1]
+            input_kind = self.types[n]
+            kind, idle = input_kind[0], 1 - input_kind[1]
             if kind in self._outputs:
                 level = idle
             elif n in driven:
                 level = driven[n]
             elif kind in SWITCHES:
                 closed = closed or self._world.switches(self._rotor.physical(t))
-                level = each[1] if closed[kind - 1] else idle
+                level = input_kind[1] if closed[kind - 1] else idle
             else:
                 level = idle
             levels.append(level)

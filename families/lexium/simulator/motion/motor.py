@@ -22,14 +22,14 @@ from math import exp, inf, log
 from multidrop.families.lexium.manual.errors import JOG_IN_CLOCK_MODE
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.simulator.motion.axis import HOMING, SLEW, Axis
-from multidrop.families.lexium.simulator.motion.counters import DIRECTIONS, Counters, Limits, Trips
-from multidrop.families.lexium.simulator.motion.feedback import VARIABLE, Encoder, Hmt, Torque
-from multidrop.families.lexium.simulator.motion.homing import Homing, LimitStop
+from multidrop.families.lexium.simulator.motion.counters import DIRECTIONS, Counters, DriveLimits, Trips
+from multidrop.families.lexium.simulator.motion.feedback import VARIABLE, Encoder, Hmt, TorqueMode
+from multidrop.families.lexium.simulator.motion.homing import LexiumHoming, LimitStop
 from multidrop.families.lexium.simulator.motion.inputs import HOME, JOG_MINUS, JOG_PLUS, ClockInputs, Inputs
-from multidrop.families.lexium.simulator.motion.rotor import Rotor
-from multidrop.families.lexium.simulator.state.errors import CRLF, Event, Fault, nothing, when
+from multidrop.families.lexium.simulator.motion.rotor import LexiumRotor
+from multidrop.families.lexium.simulator.state.errors import CRLF, DriveFault, Event, nothing, when
 from multidrop.families.lexium.simulator.state.interpreter import Core
-from multidrop.simulator.kinematics import Pace, move
+from multidrop.simulator.kinematics import MotionPace, move
 
 AMBIENT, RISE, TIME_CONSTANT = 35.0, 25.0, 300.0
 HOTTEST = 85.0
@@ -39,7 +39,7 @@ LEAST_SHARE = 0.25
 class Heat:
     """The temperature of one drive: an exponential from where it was at a time towards where it would end."""
 
-    def __init__(self, core: Core, axis: Axis, torque: Torque, disable: Callable[[float], None]) -> None:
+    def __init__(self, core: Core, axis: Axis, torque: TorqueMode, disable: Callable[[float], None]) -> None:
         self._values, self._model, self._world = core.values, core.model, core.world
         self._bridges, self._status, self._torque = axis.bridges, axis.status, torque
         self._interpreter, self._disable = core.interpreter, disable
@@ -120,22 +120,22 @@ TEST = "test"
 """The kind of motion that SC makes."""
 
 
-class Motor:
+class LexiumMotor:
     """The motor of one drive. It is the axis's supervisor. `jog` is the direction of the jog, 0 while there is none."""
 
     def __init__(self, core: Core) -> None:
         self._core, self._memory, self._timeline = core, core.memory, core.timeline
-        self.rotor = rotor = Rotor(core)
+        self.rotor = rotor = LexiumRotor(core)
         self.inputs = inputs = Inputs(core, rotor)
         self.counters = Counters(core.memory, rotor)
         self.axis = axis = Axis(core.memory, rotor, self.counters, self)
         self.status, self.bridges = axis.status, axis.bridges
-        self.limits = limits = Limits(self.counters)
+        self.limits = limits = DriveLimits(self.counters)
         self.trips = Trips(core, self.counters, inputs)
-        self.homing = Homing(core, axis, inputs, limits)
+        self.homing = LexiumHoming(core, axis, inputs, limits)
         self.limit_stop = LimitStop(core, axis, inputs, limits, self.homing)
         self.encoder = Encoder(core, axis, limits, self.stop)
-        self.torque = Torque(core, axis, limits)
+        self.torque = TorqueMode(core, axis, limits)
         self.hmt = Hmt(core, axis, self.torque, self.trips, self.stop)
         self.heat = Heat(core, axis, self.torque, lambda t: self.enable(0, t))
         self.jog = 0
@@ -221,7 +221,7 @@ class Motor:
         """Carry out PS: the program pauses; the motion slows down and stops. Raises Fault (40)."""
         thread, t = self._core.thread, self._timeline.now
         if not thread.running:
-            raise Fault(E.NO_PROGRAM_RUNNING)
+            raise DriveFault(E.NO_PROGRAM_RUNNING)
         again: Callable[[float], None] | None = None
         if not thread.paused and self.status.moving(t):
             if self.torque.halt():
@@ -236,7 +236,7 @@ class Motor:
         """Carry out RS. Raises Fault (40, 41, and the motion's own where it may not begin again)."""
         thread, t = self._core.thread, self._timeline.now
         if not thread.paused:
-            raise Fault(E.PROGRAM_RUNNING if thread.running else E.NO_PROGRAM_RUNNING)
+            raise DriveFault(E.PROGRAM_RUNNING if thread.running else E.NO_PROGRAM_RUNNING)
         again = thread.go_on(t)
         if again is not None:
             again(t)
@@ -250,15 +250,15 @@ class Motor:
         """Carry out SC 1. Raises Fault (89, 94, 96, 103)."""
         memory, values, axis = self._memory, self._memory.values, self.axis
         if not self.bridges.enabled:
-            raise Fault(E.NOT_TESTED)
+            raise DriveFault(E.NOT_TESTED)
         if self.status.moving(t):
-            raise Fault(E.CALIBRATION_WHILE_MOVING)
+            raise DriveFault(E.CALIBRATION_WHILE_MOVING)
         axis.allow(t, 1.0)
         here, vi = axis.position(t), values["VI"] * memory.scale
         self._tested_from = self.rotor.position(t)
         top, rate = values["VM"] * memory.scale, values["A"] * memory.scale
         target = here + memory.steps_per_turn / 2
-        axis.begin(TEST, move(t, here, 0.0, target, Pace(vi, top, rate, rate)), t)
+        axis.begin(TEST, move(t, here, 0.0, target, MotionPace(vi, top, rate, rate)), t)
         self._timeline.replan()
 
     def update_jog(self) -> None:
@@ -267,7 +267,7 @@ class Motor:
         try:
             if values["JE"] and inputs.watched:
                 if values.get("CM"):
-                    raise Fault(JOG_IN_CLOCK_MODE)
+                    raise DriveFault(JOG_IN_CLOCK_MODE)
                 wanted = inputs.wants(JOG_PLUS) - inputs.wants(JOG_MINUS)
             if wanted == before or (not before and self.status.moving(t)):
                 return
@@ -279,7 +279,7 @@ class Motor:
             elif self.axis.kind == SLEW:
                 self.axis.slow_to(0, t)
                 self._core.thread.drop_motion()
-        except Fault as fault:
+        except DriveFault as fault:
             self._core.interpreter.raise_error(fault.code)
 
     def end_jog(self) -> None:

@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
 from multidrop.families.lexium.simulator.motion.feedback import FIXED, HYBRID, LAG, LEAD, MOST, VARIABLE
-from multidrop.families.lexium.simulator.motion.motor import Motor
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.motion.motor import LexiumMotor
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.interpreter import Core
 
 GENERAL, MOVING, ERROR, STALL, CHANGING, LOCKED_ROTOR, POSITIONING = 16, 17, 18, 19, 20, 21, 23
@@ -37,7 +37,7 @@ State = Callable[[float], bool]
 class Outputs:
     """All outputs of a drive. `types` holds type and active level by number, `driven` what O<n> said."""
 
-    def __init__(self, core: Core, motor: Motor) -> None:
+    def __init__(self, core: Core, motor: LexiumMotor) -> None:
         self._values, self._timeline, self._points = core.values, core.timeline, core.model.points
         self.types: dict[int, tuple[int, ...]] = {}
         self.driven: dict[int, int] = {}
@@ -61,15 +61,15 @@ class Outputs:
         """Carry out OS. Raises Fault (6, 8, 10, 21)."""
         n, *rest = values
         if n not in self.types:
-            raise Fault(E.NO_SUCH_POINT)
+            raise DriveFault(E.NO_SUCH_POINT)
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
         if len(rest) > 2 or active not in (0, 1):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         if kind not in self._points.output_types[n] or (kind in HMT_TYPES and "AS" not in self._values):
-            raise Fault(E.WRONG_POINT_TYPE)
+            raise DriveFault(E.WRONG_POINT_TYPE)
         several = kind in (GENERAL, *CLOCK_TYPES)
         if not several and any(kind == self.types[k][0] for k in self.types if k != n):
-            raise Fault(E.TYPE_IN_USE)
+            raise DriveFault(E.TYPE_IN_USE)
         self.types[n] = (kind, 0 if kind == TRIP else active)
 
     def release(self, n: int) -> None:
@@ -79,14 +79,14 @@ class Outputs:
     def write(self, n: int, value: int) -> None:
         """Carry out O<n>: make a general purpose output active or not. Raises Fault (9)."""
         if self.types[n][0] != GENERAL:
-            raise Fault(E.NOT_USER_OUTPUT)
+            raise DriveFault(E.NOT_USER_OUTPUT)
         self.driven[n] = value
 
     def write_all(self, group: Sequence[int], value: int) -> None:
         """Carry out OT, OL, OH; only points of type 16 change. Raises Fault (9) if a Lexium has none of them."""
         free = [(place, n) for place, n in enumerate(group) if self.types[n][0] == GENERAL]
         if not (free or self._points.shared):
-            raise Fault(E.NOT_USER_OUTPUT)
+            raise DriveFault(E.NOT_USER_OUTPUT)
         for place, n in free:
             self.driven[n] = value >> place & 1
 
@@ -107,7 +107,7 @@ class Outputs:
         return self.types[n][1] if self.active(n, t) else 1 - self.types[n][1]
 
 
-def _states(core: Core, motor: Motor) -> Mapping[int, State]:
+def _states(core: Core, motor: LexiumMotor) -> Mapping[int, State]:
     """Make the state that each type of output follows."""
     values, timeline = core.values, core.timeline
     status, hmt, trips, counters = motor.status, motor.hmt, motor.trips, motor.counters

@@ -18,7 +18,7 @@ from math import copysign, floor, inf
 
 from multidrop.families.lexium.simulator.state.errors import Event, nothing, when
 from multidrop.families.lexium.simulator.state.interpreter import Core
-from multidrop.simulator.kinematics import Pace, Profile, halt, meeting, move, slew
+from multidrop.simulator.kinematics import MotionPace, Profile, halt, meeting, move, slew
 from multidrop.simulator.world import AFTER, REVOLUTION, TOUCH, World
 
 
@@ -51,15 +51,15 @@ class WorldFrame:
         if profile.end <= t:
             return inf
         physical = profile if self._rate == 1.0 else profile.scaled(self._rate)
-        found = self._world.next_switch(physical, t, self._origin + self._rate * shift)
-        if found == inf or (physical is profile and not (self._origin or shift)):
-            return found
+        when = self._world.next_switch(physical, t, self._origin + self._rate * shift)
+        if when == inf or (physical is profile and not (self._origin or shift)):
+            return when
 
         def switches(t: float) -> tuple[bool, bool, bool]:
             return self._world.switches(self.physical(profile.position(t) + shift))
 
         before = switches(t)
-        return next((found + later for later in AFTER if switches(found + later) != before), found + AFTER[-1])
+        return next((when + later for later in AFTER if switches(when + later) != before), when + AFTER[-1])
 
     def index_ahead(self, here: float, direction: float, offset: float = 0.0) -> float:
         """The next place beyond `here` that is `offset` (steps of 1/51200 turn) from an index mark."""
@@ -90,7 +90,7 @@ SYSTEM_SPEED = 10000.0
 """The fastest that make-up is, steps/s for each microstep: 3000 turns a minute (manual 8.3)."""
 
 
-class Rotor:
+class LexiumRotor:
     """One rotor. `closed`: hMT keeps track of it; `command` is the profile that it follows."""
 
     def __init__(self, core: Core) -> None:
@@ -249,10 +249,10 @@ class Rotor:
         place, direction = wall
         profile, shift = self.path
         if (profile.position(t) + shift - place) * direction > -TOUCH:
-            found = profile.turning(direction, t)
+            when = profile.turning(direction, t)
         else:
-            found = profile.crossing(place - shift, t, direction)
-        return found, lambda at: self._stand(WALL, at)
+            when = profile.crossing(place - shift, t, direction)
+        return when, lambda at: self._stand(WALL, at)
 
     @property
     def _current(self) -> float:
@@ -298,12 +298,12 @@ class Rotor:
         command = self.command
         if command.end < inf and command.velocity(t) * (command.target - command.position(t)) >= 0:
             top = self._make_up_speed(float(self.values["VM"]) if command.end > t else 0.0)
-            pace = Pace(MAKE_UP_VI, top, MAKE_UP_RATE, MAKE_UP_RATE)
+            pace = MotionPace(MAKE_UP_VI, top, MAKE_UP_RATE, MAKE_UP_RATE)
             self._own = move(t, here, velocity, command.target - self.slip, pace)
         else:
             speed = float(self.values["VM"]) if command.end < inf else abs(command.segments[-1].velocity)
             direction = copysign(1.0, command.position(t) - self.slip - here)
-            pace = Pace(MAKE_UP_VI, self._make_up_speed(speed), MAKE_UP_RATE, MAKE_UP_RATE)
+            pace = MotionPace(MAKE_UP_VI, self._make_up_speed(speed), MAKE_UP_RATE, MAKE_UP_RATE)
             self._own = slew(t, here, velocity, direction * pace.vm, pace)
         self.state, self._cause = CATCHING, ""
         met = meeting(self._own, command, -self.slip, t)

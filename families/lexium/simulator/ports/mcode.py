@@ -40,7 +40,7 @@ from __future__ import annotations
 import re
 
 from multidrop.families.lexium.simulator.device import MCodeDevice
-from multidrop.families.lexium.simulator.ports.replies import CRLF, LINE_BUFFER, Line, Mode, Replier
+from multidrop.families.lexium.simulator.ports.replies import CRLF, LINE_BUFFER, Mode, ReceivedLine, Replier
 from multidrop.simulator.wire import Transmission
 
 CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
@@ -58,7 +58,7 @@ ADDRESSES = frozenset({CR, LF, *b"*^"})
 """Bytes that begin a line in party mode, except for names."""
 KEY_ALONE, KEY_WITH_CHECK = "alone", "with its check byte"
 """The bytes received so far of a key that acts at once: a check byte and a CR after it belong to it."""
-DEAF = Line(Mode(echo=0, party=True, checksum=0, name=""), mine=False)
+DEAF = ReceivedLine(Mode(echo=0, party=True, checksum=0, name=""), mine=False)
 """A line for another drive, in party mode: nothing of it is kept."""
 STEP_KEYS = {0x20: " ", CR: "\r"}
 MOST_WAITING = 64
@@ -127,7 +127,7 @@ class MCodePort:
 
     def advance(self, now: float) -> bytes:
         """Return what the drive has sent up to `now`, since it was last asked."""
-        return b"".join(each.data for each in self.sent(now))
+        return b"".join(transmission.data for transmission in self.sent(now))
 
     def sent(self, now: float) -> list[Transmission]:
         """Return the same as transmissions; other drives overhear prints in party mode."""
@@ -174,8 +174,8 @@ class MCodePort:
             self._forget()
 
     def _forget(self) -> None:
-        self._line: Line | None = None
-        self._waiting: list[Line] = []
+        self._line: ReceivedLine | None = None
+        self._waiting: list[ReceivedLine] = []
         self._overheard.clear()
         self._active = False
         self._before = 0
@@ -220,7 +220,7 @@ class MCodePort:
         elif byte == LF:
             self._replier.line_feed(mode, now)
         else:
-            self._line = Line(mode)
+            self._line = ReceivedLine(mode)
             if byte == CR:
                 self._on_end_of(self._line, byte, now)
             else:
@@ -240,11 +240,11 @@ class MCodePort:
             own = name == mode.name.encode("latin-1", "replace")
             group = name == b"*" or (name == b"^" and bool(self._memory.values.get("QD")))  # 5.1.106
             replies = own or (group and not self._memory.values.get("DG", 1))  # 5.1.31
-            self._line = Line(mode, name, mine=own or group, replies=replies)
+            self._line = ReceivedLine(mode, name, mine=own or group, replies=replies)
             if replies:
                 self._replier.echo(mode, name, now)
 
-    def _on_text(self, line: Line, text: bytes, now: float) -> None:
+    def _on_text(self, line: ReceivedLine, text: bytes, now: float) -> None:
         if not line.mine:
             return
         for plain, key in TYPED.findall(text) if not ERASERS.isdisjoint(text) else ((text, b""),):
@@ -254,7 +254,7 @@ class MCodePort:
                 if line.replies:
                     self._replier.echo(line.mode, key, now)
 
-    def _on_characters(self, line: Line, text: bytes, now: float) -> None:
+    def _on_characters(self, line: ReceivedLine, text: bytes, now: float) -> None:
         if not line.mine:
             return
         fits = text[: LINE_BUFFER - len(line.name) - len(line.text)]
@@ -264,7 +264,7 @@ class MCodePort:
         if len(fits) < len(text):
             self._replier.overflow(line, now)
 
-    def _on_end_of(self, line: Line, byte: int, now: float) -> None:
+    def _on_end_of(self, line: ReceivedLine, byte: int, now: float) -> None:
         """Take CR or LF within a line."""
         if line.mode.party or byte == CR:
             self._line, line.entered = None, byte == CR

@@ -33,7 +33,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from struct import pack, unpack
 
-from multidrop.families.lexium.manual.grammar import Name, Number
+from multidrop.families.lexium.manual.grammar import NameTerm, Number
 from multidrop.families.lexium.manual.groups import MOTIONS
 from multidrop.families.lexium.manual.modbus.registers import (
     AT,
@@ -43,9 +43,9 @@ from multidrop.families.lexium.manual.modbus.registers import (
     POINTS,
     REGISTERS,
     SETUPS,
-    Register,
+    ModbusRegister,
 )
-from multidrop.families.lexium.simulator.device import Answer, MCodeDevice
+from multidrop.families.lexium.simulator.device import MCodeDevice, PrintedAnswer
 from multidrop.families.lexium.simulator.motion.counters import HMT, RELATIVE
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE, FAILURE = 2, 3, 4
@@ -67,7 +67,7 @@ LONGEST_DATA = 28
 LONGEST_TEXT = 250
 
 
-class Refusal(Exception):
+class ModbusRefusal(Exception):
     """An exception response with this code."""
 
     def __init__(self, code: int) -> None:
@@ -75,7 +75,7 @@ class Refusal(Exception):
         self.code = code
 
 
-class Registers:
+class DriveRegisters:
     """One drive's registers. Times are the drive's; raises Refusal."""
 
     def __init__(self, device: MCodeDevice) -> None:
@@ -88,7 +88,7 @@ class Registers:
         """Read registers; one word of a value of two words is that word."""
         rows = _rows(start, count)
         if not all(row.readable or row.name in READ_ALSO for row in rows):
-            raise Refusal(ILLEGAL_ADDRESS)
+            raise ModbusRefusal(ILLEGAL_ADDRESS)
         if count == 2 and rows[0] is rows[1]:
             return self._words(rows[0], now)
         return [self._words(row, now)[address - row.address] for address, row in enumerate(rows, start)]
@@ -97,14 +97,14 @@ class Registers:
         """Write registers; a value of two words needs both."""
         rows = _rows(start, len(words))
         if not all(row.writable for row in rows):
-            raise Refusal(ILLEGAL_ADDRESS)
+            raise ModbusRefusal(ILLEGAL_ADDRESS)
         values = _values(start, rows, words)
         for (row, value), line in [(each, _line(*each)) for each in values]:
             self.carry_out(line, now)
             if row.name == "TS":  # a divider, whose speed can be beyond the range of MCode: no line can set it
                 self._torque.set_speed(round(OSCILLATOR / (value + 2)) if value else 0)
 
-    def _words(self, row: Register, now: float) -> list[int]:
+    def _words(self, row: ModbusRegister, now: float) -> list[int]:
         match row.name:
             case "O1" | "O2" | "O3":
                 value = int(self.coils(int(row.name[1:]) - 1, 1, now)[0])
@@ -114,8 +114,8 @@ class Registers:
                 value = self._trip(now)
             case _:
                 value = self.number(row.name, now)
-        if row.name in SHOWN:
-            value = SHOWN[row.name](value)
+        if row.name in SHOWN_VALUES:
+            value = SHOWN_VALUES[row.name](value)
         return [value >> 16 * place & 0xFFFF for place in range(row.count)]
 
     def number(self, word: str, now: float) -> int:
@@ -139,7 +139,7 @@ class Registers:
 
     def write_coil(self, address: int, on: bool, now: float) -> None:
         if not address < len(OUTPUTS):
-            raise Refusal(ILLEGAL_ADDRESS)
+            raise ModbusRefusal(ILLEGAL_ADDRESS)
         self.carry_out(f"O{address + 1}={int(on)}", now)
 
     # Functions by name.
@@ -150,10 +150,10 @@ class Registers:
             self.carry_out(END, now)
             return ""
         if name not in READ_BY_NAME:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ModbusRefusal(ILLEGAL_VALUE)
         if name in POINTS:
             self._drive.advance(now)
-            return ", ".join(str(each) for each in (*self._inputs.types[POINTS[name]], 0)[:3])
+            return ", ".join(str(level) for level in (*self._inputs.types[POINTS[name]], 0)[:3])
         if name == "TR" and RELATIVE not in self._trips.defined:
             return "0, 0, 0"
         return CRLF.join(self.carry_out(f"PR {name}", now).lines)[:LONGEST_TEXT]
@@ -161,9 +161,9 @@ class Registers:
     def write_named(self, name: str, data: bytes, now: float) -> None:
         """Carry out function 66: a name and what follows it in the drive's own language."""
         if name != END and name not in WRITTEN_BY_NAME:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ModbusRefusal(ILLEGAL_VALUE)
         if len(data) > LONGEST_DATA or any(not 0x20 <= byte < 0x7F for byte in data):
-            raise Refusal(ILLEGAL_VALUE)
+            raise ModbusRefusal(ILLEGAL_VALUE)
         text = data.decode("ascii")
         if name in POINTS:
             kind, active, *_ = (*text.removeprefix("=").split(","), "", "")
@@ -177,7 +177,7 @@ class Registers:
         if trip is None:
             return 0
         place = 0
-        if isinstance(trip.target, Name):
+        if isinstance(trip.target, NameTerm):
             place = self._program.labels.get(trip.target.word, 0)
         elif isinstance(trip.target, Number):
             place = int(trip.target.value)
@@ -189,33 +189,33 @@ class Registers:
         """Return the first line that PR prints of a word."""
         return self.carry_out(f"PR {word}", now).lines[0]
 
-    def carry_out(self, line: str, now: float) -> Answer:
+    def carry_out(self, line: str, now: float) -> PrintedAnswer:
         """Carry out one line at once, in program mode too. Raises Refusal (3, 4) if the drive refuses it."""
         answer = self._drive.execute(line, now, immediate=True)
         if answer.refused:
             code = self._errors.code
-            raise Refusal(ILLEGAL_VALUE if code in VALUE_ERRORS else FAILURE)
+            raise ModbusRefusal(ILLEGAL_VALUE if code in VALUE_ERRORS else FAILURE)
         return answer
 
 
-def _rows(start: int, count: int) -> list[Register]:
+def _rows(start: int, count: int) -> list[ModbusRegister]:
     """Find the values of registers, one for each. Raises Refusal (2, 3)."""
     if not 1 <= count <= MOST_REGISTERS:
-        raise Refusal(ILLEGAL_VALUE)
+        raise ModbusRefusal(ILLEGAL_VALUE)
     try:
         return [AT[address] for address in range(start, start + count)]
     except KeyError:
-        raise Refusal(ILLEGAL_ADDRESS) from None
+        raise ModbusRefusal(ILLEGAL_ADDRESS) from None
 
 
 def _check_points(start: int, count: int) -> None:
     if not 1 <= count <= COUNTED_POINTS:
-        raise Refusal(ILLEGAL_VALUE)
+        raise ModbusRefusal(ILLEGAL_VALUE)
     if not 0 <= start <= start + count <= COUNTED_POINTS:
-        raise Refusal(ILLEGAL_ADDRESS)
+        raise ModbusRefusal(ILLEGAL_ADDRESS)
 
 
-def _values(start: int, rows: Sequence[Register], words: Sequence[int]) -> list[tuple[Register, int]]:
+def _values(start: int, rows: Sequence[ModbusRegister], words: Sequence[int]) -> list[tuple[ModbusRegister, int]]:
     """Combine words to the values of registers. Raises Refusal (3) for a part of a value."""
     if len(rows) == 2 and rows[0] is rows[1]:
         value = words[0] | words[1] << 16
@@ -223,14 +223,14 @@ def _values(start: int, rows: Sequence[Register], words: Sequence[int]) -> list[
             value -= 1 << 32
         return [(rows[0], value)]
     if any(row.width > 2 or address != row.address for address, row in enumerate(rows, start)):
-        raise Refusal(ILLEGAL_VALUE)
+        raise ModbusRefusal(ILLEGAL_VALUE)
     return list(zip(rows, words, strict=True))
 
 
-def _line(row: Register, value: int) -> str:
+def _line(row: ModbusRegister, value: int) -> str:
     """Translate a write to a line of the drive. Raises Refusal (3) for a value that the register refuses."""
     if not row.allows(value):
-        raise Refusal(ILLEGAL_VALUE)
+        raise ModbusRefusal(ILLEGAL_VALUE)
     name = row.name
     match name:
         case "S" | "IP" | "CF":
@@ -240,18 +240,18 @@ def _line(row: Register, value: int) -> str:
         case "TS":
             return "PR TS"
         case "ER" if value:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ModbusRefusal(ILLEGAL_VALUE)
         case "IC" | "DC":
             stepped = AT.get(value)
             if stepped is None or stepped.address != value:
-                raise Refusal(ILLEGAL_VALUE)
+                raise ModbusRefusal(ILLEGAL_VALUE)
             return f"{name} {stepped.name}"
         case "OT":
             return f"OT={value & 7}"
         case "TA":
             mask, place = value & 0xFFFF, value >> 16 & 0xFFFF
             if mask not in MASKS:
-                raise Refusal(ILLEGAL_VALUE)
+                raise ModbusRefusal(ILLEGAL_VALUE)
             return f"TA={mask},{place}"
     return f"{name} {value}" if name in MOTIONS else f"{name}={value}"
 
@@ -259,7 +259,7 @@ def _line(row: Register, value: int) -> str:
 READ_ALSO = OUTPUTS.keys()
 """Write only by name, but a note of 4.2.2 has them read."""
 
-SHOWN: Mapping[str, Callable[[int], int]] = {
+SHOWN_VALUES: Mapping[str, Callable[[int], int]] = {
     "I5": lambda counts: counts // 4,
     "AF": lambda status: status & 0xFF,
     "OF": lambda faults: int(faults != 0),
@@ -270,7 +270,7 @@ SHOWN: Mapping[str, Callable[[int], int]] = {
 
 HEADER = 6
 """Bytes before those that the length counts."""
-SHORTEST, LONGEST = 2, 254
+SHORTEST_MESSAGE, LONGEST_MESSAGE = 2, 254
 """The range of the length."""
 ILLEGAL_FUNCTION = 1
 EXCEPTION = 0x80
@@ -287,7 +287,7 @@ class ModbusPort:
 
     def __init__(self, device: MCodeDevice) -> None:
         self.closed = False
-        self._drive, self._registers = device, Registers(device)
+        self._drive, self._registers = device, DriveRegisters(device)
         self._begun = bytearray()
 
     def receive(self, data: bytes, now: float) -> bytes:
@@ -304,7 +304,7 @@ class ModbusPort:
         out, at = bytearray(), 0
         while len(begun) - at >= HEADER:
             protocol, length = unpack(">HH", begun[at + 2 : at + HEADER])
-            if not SHORTEST <= length <= LONGEST:
+            if not SHORTEST_MESSAGE <= length <= LONGEST_MESSAGE:
                 self.closed = True
                 begun.clear()
                 return bytes(out)
@@ -321,7 +321,7 @@ class ModbusPort:
     def _answer(self, pdu: bytes, now: float) -> bytes:
         try:
             return pdu[:1] + self._carry_out(pdu[0], pdu[1:], now)
-        except Refusal as refusal:
+        except ModbusRefusal as refusal:
             return bytes((pdu[0] | EXCEPTION, refusal.code))
 
     def _carry_out(self, function: int, body: bytes, now: float) -> bytes:
@@ -338,41 +338,41 @@ class ModbusPort:
             case 5:
                 address, value = _pair(body)
                 if value not in (ON, OFF):
-                    raise Refusal(ILLEGAL_VALUE)
+                    raise ModbusRefusal(ILLEGAL_VALUE)
                 registers.write_coil(address, value == ON, now)
                 return body
             case 16:
                 if len(body) < 5:
-                    raise Refusal(ILLEGAL_VALUE)
+                    raise ModbusRefusal(ILLEGAL_VALUE)
                 start, count, size = unpack(">HHB", body[:5])
                 if not 1 <= count <= MOST_REGISTERS or size != 2 * count or len(body) != 5 + size:
-                    raise Refusal(ILLEGAL_VALUE)
+                    raise ModbusRefusal(ILLEGAL_VALUE)
                 registers.write(start, unpack(f">{count}H", body[5:]), now)
                 return body[:4]
             case 43:
                 return self._identify(body, now)
             case 65:
                 if len(body) != 4:
-                    raise Refusal(ILLEGAL_VALUE)
+                    raise ModbusRefusal(ILLEGAL_VALUE)
                 text = registers.read_named(_mnemonic(body), now).encode("latin-1")
                 return bytes((len(text),)) + text
             case 66:
                 if len(body) < 5 or len(body) != 5 + body[4]:
-                    raise Refusal(ILLEGAL_VALUE)
+                    raise ModbusRefusal(ILLEGAL_VALUE)
                 registers.write_named(_mnemonic(body[:4]), body[5:], now)
                 return body[4:5] + body[:4]
-        raise Refusal(ILLEGAL_FUNCTION)
+        raise ModbusRefusal(ILLEGAL_FUNCTION)
 
     def _identify(self, body: bytes, now: float) -> bytes:
         """Function 43/14."""
         if body[:1] != bytes((DEVICE_ID,)):
-            raise Refusal(ILLEGAL_FUNCTION if body else ILLEGAL_VALUE)
+            raise ModbusRefusal(ILLEGAL_FUNCTION if body else ILLEGAL_VALUE)
         if len(body) != 3 or not 1 <= body[1] <= INDIVIDUAL:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ModbusRefusal(ILLEGAL_VALUE)
         code, first = body[1:]
         if code == INDIVIDUAL:
             if first >= OBJECTS:
-                raise Refusal(ILLEGAL_ADDRESS)
+                raise ModbusRefusal(ILLEGAL_ADDRESS)
             wanted = range(first, first + 1)
         else:
             last = BASIC if code == 1 else OBJECTS
@@ -388,7 +388,7 @@ class ModbusPort:
 def _pair(body: bytes) -> tuple[int, int]:
     """Read two words and nothing else. Raises Refusal (3)."""
     if len(body) != 4:
-        raise Refusal(ILLEGAL_VALUE)
+        raise ModbusRefusal(ILLEGAL_VALUE)
     first, second = unpack(">HH", body)
     return first, second
 

@@ -21,7 +21,7 @@ from multidrop.simulator.wire import BITS_A_BYTE, Transmission
 CRLF = b"\r\n"
 ACK, NAK = b"\x06", b"\x15"
 LINE_BUFFER = 64
-HELD = 2
+HELD_BYTE_TIMES = 2
 """Bytes whose time the rest of a reply is held for a LF behind the CR, on a drive that gives it back first."""
 
 
@@ -34,7 +34,7 @@ class Mode(NamedTuple):
     name: str
 
 
-class Line:
+class ReceivedLine:
     """A line that is being received: its settings, its addressee, and its text.
 
     `mine`: it is for this drive. `replies`: this drive replies to it. `entered`: a carriage return ends it.
@@ -46,7 +46,7 @@ class Line:
         self.text = bytearray()
 
 
-class Outcome(NamedTuple):
+class LineOutcome(NamedTuple):
     """The outcome of a line. `busy`: a program ran when it came; `flagged`: an old error causes NAK."""
 
     lines: tuple[str, ...] = ()
@@ -62,7 +62,7 @@ def checksum(text: bytes) -> int:
     return (128 - sum(text) % 128) % 128 | 0x80
 
 
-def split(line: Line) -> tuple[bytes, bool]:
+def split(line: ReceivedLine) -> tuple[bytes, bool]:
     """Split off the checksum; return the command, and whether the checksum is right (with CK=0 it may be absent)."""
     text = bytes(line.text)
     if not line.mode.checksum:
@@ -72,7 +72,7 @@ def split(line: Line) -> tuple[bytes, bool]:
     return text[:-1], (sum(line.name) + sum(text)) % 128 == 0
 
 
-def compose(mode: Mode, text: bytes, outcome: Outcome, prompt: str) -> bytes:
+def compose(mode: Mode, text: bytes, outcome: LineOutcome, prompt: str) -> bytes:
     """Compose the whole reply to one line of this text, without the characters that EM=0 has echoed before."""
     out = bytearray()
     for line in outcome.lines:
@@ -123,25 +123,25 @@ class Replier:
         if mode.echo == 0:
             self.send(now, text)
 
-    def overflow(self, line: Line, now: float) -> None:
+    def overflow(self, line: ReceivedLine, now: float) -> None:
         """Refuse a line that is too long; the rest of it is dropped."""
         self._device.fail(ErrorNumber.UNKNOWN_VARIABLE, now)
         if line.replies:
-            self.send(now, compose(line.mode, bytes(line.text), Outcome(good=False), "?"))
+            self.send(now, compose(line.mode, bytes(line.text), LineOutcome(good=False), "?"))
         line.mine = False
 
-    def carry_out(self, line: Line, now: float) -> None:
+    def carry_out(self, line: ReceivedLine, now: float) -> None:
         device, memory, mode = self._device, self._memory, line.mode
         command, sound = split(line)
         before, busy = memory.checksum, device.thread.running
         flagged = memory.model.flags_by_nak and memory.error_flag
         if sound and command.strip():
             answer = device.execute(command.decode("latin-1"), now)
-            outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
+            outcome = LineOutcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
         else:
             if sound and line.entered:
                 device.enter(now)
-            outcome = Outcome(damaged=not sound, busy=busy, flagged=flagged)
+            outcome = LineOutcome(damaged=not sound, busy=busy, flagged=flagged)
         if self._serial and memory.checksum != before:
             mode = mode._replace(checksum=memory.checksum)
         if line.replies:
@@ -150,7 +150,7 @@ class Replier:
             held = memory.model.echoes_before_value and mode.echo == 0 and not (mode.party or mode.checksum)
             if held and reply.startswith(CRLF):
                 self.send(now, CRLF)
-                self._held = Transmission(now + HELD * self._byte_time, reply[len(CRLF) :])
+                self._held = Transmission(now + HELD_BYTE_TIMES * self._byte_time, reply[len(CRLF) :])
             else:
                 self.send(now, reply)
 
@@ -193,10 +193,13 @@ class Replier:
     def send(self, at: float, data: bytes, *, overheard: bool = False) -> None:
         """Send bytes, and before them the rest of a reply that was held."""
         held, self._held = self._held, None
-        for each in (*([held._replace(at=min(held.at, at))] if held else ()), Transmission(at, data, overheard)):
-            if each.data:
-                self.queue.append(each)
-                self._busy_until = max(self._busy_until, each.at) + len(each.data) * self._byte_time
+        for transmission in (
+            *([held._replace(at=min(held.at, at))] if held else ()),
+            Transmission(at, data, overheard),
+        ):
+            if transmission.data:
+                self.queue.append(transmission)
+                self._busy_until = max(self._busy_until, transmission.at) + len(transmission.data) * self._byte_time
 
     def take(self, now: float) -> list[Transmission]:
         self.release(now)
@@ -219,7 +222,7 @@ class Replier:
         self._begun += rest
         return bytes(out + rest)
 
-    def prompt(self, outcome: Outcome | None = None) -> str:
+    def prompt(self, outcome: LineOutcome | None = None) -> str:
         """EM=0's prompt; in program mode the address that the next stored line gets, and two spaces."""
         at = self._device.programming
         if at is not None:

@@ -38,7 +38,7 @@ BITS_A_BYTE, TRANSMIT_BUFFER = 10, 256
 """Bits on the wire for a byte; bytes that wait to be sent when the next print waits, or is lost (not in the manual)."""
 
 
-class Printer:
+class DriveOutput:
     """The output of one drive.
 
     `immediate`: a typed line is being carried out, and takes what is printed as its answer. `printed`: times and texts
@@ -84,7 +84,7 @@ class Printer:
         return printed
 
 
-class Fault(Exception):
+class DriveFault(Exception):
     """A drive's error, with its code (manual, section 10). `fatal` ends a program that has no error handler."""
 
     def __init__(self, code: int, fatal: bool = False) -> None:
@@ -93,7 +93,7 @@ class Fault(Exception):
 
 
 @dataclass
-class Failure:
+class RecordedError:
     """A recorded error: its time, code and line of the linked program. `handled`: OE's subroutine was called."""
 
     t: float
@@ -111,7 +111,7 @@ class ErrorFlag:
 
     def __init__(self, values: MutableMapping[str, int | float], codes: Mapping[int, int], timeline: Timeline) -> None:
         self._values, self._codes, self._timeline = values, codes, timeline
-        self.failures: list[Failure] | None = None
+        self.failures: list[RecordedError] | None = None
         self.line: Callable[[], int] = lambda: 0
 
     @property
@@ -122,12 +122,12 @@ class ErrorFlag:
         number = self._codes.get(code, int(code))
         self._values["ER"], self._values["EF"] = number, 1
         if self.failures is not None:
-            self.failures.append(Failure(self._timeline.now, number, self.line()))
+            self.failures.append(RecordedError(self._timeline.now, number, self.line()))
 
     def clear(self) -> None:
         self._values["ER"], self._values["EF"] = 0, 0
 
     def handled(self) -> None:
         """Record that the subroutine of OE is called for the errors of this moment."""
-        for each in self.failures or ():
-            each.handled = each.handled or each.t == self._timeline.now
+        for failure in self.failures or ():
+            failure.handled = failure.handled or failure.t == self._timeline.now

@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Binary, Compare, Expression, Name, Number, Unary
+from multidrop.families.lexium.manual.grammar import BinaryTerm, Compare, Expression, NameTerm, Number, UnaryTerm
 from multidrop.families.lexium.manual.groups import FUNCTIONS
 from multidrop.families.lexium.manual.statements import compares
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 
 Value = int | float
 Read = Callable[[], Value]
@@ -37,13 +37,13 @@ def whole(value: Value) -> int:
     if isinstance(value, int):
         return value
     if not math.isfinite(value):
-        raise Fault(E.ILLEGAL_DATA)
+        raise DriveFault(E.ILLEGAL_DATA)
     return int(value)
 
 
 def _divide(left: Value, right: Value) -> int:
     if right == 0:
-        raise Fault(E.ILLEGAL_DATA)
+        raise DriveFault(E.ILLEGAL_DATA)
     quotient = abs(whole(left)) // abs(whole(right))
     return wrap(-quotient if (left < 0) != (right < 0) else quotient)
 
@@ -81,9 +81,9 @@ def is_floating(expression: Expression) -> bool:
     """Return whether an expression needs double precision by itself."""
     if isinstance(expression, Number):
         return isinstance(expression.value, float)
-    if isinstance(expression, Name):
+    if isinstance(expression, NameTerm):
         return expression.word in FLOATS
-    if isinstance(expression, Unary):
+    if isinstance(expression, UnaryTerm):
         return expression.op in FUNCTIONS or is_floating(expression.operand)
     if isinstance(expression, Compare):  # 0 or 1, whatever it compares
         return False
@@ -92,9 +92,9 @@ def is_floating(expression: Expression) -> bool:
 
 def _calls(expression: Expression) -> bool:
     """Return whether a function is in it."""
-    if isinstance(expression, Unary):
+    if isinstance(expression, UnaryTerm):
         return expression.op in FUNCTIONS or _calls(expression.operand)
-    return isinstance(expression, Binary | Compare) and (_calls(expression.left) or _calls(expression.right))
+    return isinstance(expression, BinaryTerm | Compare) and (_calls(expression.left) or _calls(expression.right))
 
 
 @dataclass(frozen=True)
@@ -113,12 +113,12 @@ class Compiler:
         Raises Fault (24) where a comparison is in it: only conditions hold one.
         """
         if compares(expression):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         return self.value(expression, floating)
 
     def value(self, expression: Expression, floating: bool = False) -> Read:
         if not self.floating_point and _calls(expression):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         return self.compile(expression, self.floating_point and (floating or is_floating(expression)))
 
     def condition(self, condition: Expression) -> Callable[[], bool]:
@@ -138,17 +138,17 @@ class Compiler:
         if isinstance(expression, Number):
             constant = expression.value
             return lambda: constant
-        if isinstance(expression, Name):
+        if isinstance(expression, NameTerm):
             return self.lookup(expression.word)
-        if isinstance(expression, Unary):
+        if isinstance(expression, UnaryTerm):
             return self.unary(expression, floating)
         if isinstance(expression, Compare):
             holds = self.condition(expression)
             return lambda: int(holds())
-        left, right = (self.compile(each, floating) for each in (expression.left, expression.right))
+        left, right = (self.compile(side, floating) for side in (expression.left, expression.right))
         return _binary(expression.op, left, right, floating)
 
-    def unary(self, expression: Unary, floating: bool) -> Read:
+    def unary(self, expression: UnaryTerm, floating: bool) -> Read:
         operand = self.compile(expression.operand, floating)
         if expression.op == "!":
             return lambda: ~whole(operand())
@@ -168,7 +168,7 @@ def _compile_function(word: str, operand: Read, radians: Read) -> Read:
                 return angle if radians() else math.degrees(angle)
             return _PLAIN[word](value)
         except (ValueError, OverflowError):
-            raise Fault(E.ILLEGAL_DATA) from None
+            raise DriveFault(E.ILLEGAL_DATA) from None
 
     return read
 
@@ -184,9 +184,9 @@ def _binary(op: str, left: Read, right: Read, floating: bool) -> Read:
         try:
             value = apply(left(), right())
         except (OverflowError, ZeroDivisionError):
-            raise Fault(E.ILLEGAL_DATA) from None
+            raise DriveFault(E.ILLEGAL_DATA) from None
         if not math.isfinite(value):
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         return value
 
     return read

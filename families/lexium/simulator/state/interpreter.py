@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from math import inf
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Argument, Name, Statement, is_name
+from multidrop.families.lexium.manual.grammar import Argument, NameTerm, Statement, is_name
 from multidrop.families.lexium.manual.table import lookup
-from multidrop.families.lexium.simulator.state.errors import CRLF, ErrorFlag, Fault, Printer, Timeline
+from multidrop.families.lexium.simulator.state.errors import CRLF, DriveFault, DriveOutput, ErrorFlag, Timeline
 from multidrop.families.lexium.simulator.state.memory import TABLE_SIZE, Memory
-from multidrop.families.lexium.simulator.state.program_memory import Action, LinkedProgram, Program
+from multidrop.families.lexium.simulator.state.program_memory import Action, LinkedProgram, ProgramContents
 from multidrop.simulator.world import World
 
 STACK_DEPTH = 10
@@ -35,7 +35,7 @@ Resume = Callable[[float], None]
 
 
 @dataclass
-class Frame:
+class CallFrame:
     """Where a subroutine returns to, and the hold that it interrupted: for motion, or until a time. `ending`: it is
     the end of the program that waits for motion.
     """
@@ -46,7 +46,7 @@ class Frame:
     ending: bool = False
 
 
-class Thread:
+class ProgramThread:
     """The one program that a drive can run. `next_at` is when line `pc` is due, `executed` counts lines.
 
     `live`: lines are executed. It is asleep while `paused`, `waiting` (H for motion), `ending` (E after the motion), or
@@ -62,7 +62,7 @@ class Thread:
         self.steps = 0
         self.next_at = inf
         self.pc = 0
-        self.stack: list[Frame] = []
+        self.stack: list[CallFrame] = []
         self.handling = 0
         self.stopped_motion: Resume | None = None
         self._hold_until = -inf
@@ -146,13 +146,13 @@ class Thread:
 
     def call(self, entry: int) -> None:
         """Go on elsewhere until RT. Raises Fault (43)."""
-        self.push(Frame(self.pc))
+        self.push(CallFrame(self.pc))
         self.pc = entry
 
     def give_back(self) -> None:
         """RT. Raises Fault (43) where nothing was called."""
         if not self.stack:
-            raise Fault(E.STACK_FULL, fatal=True)
+            raise DriveFault(E.STACK_FULL, fatal=True)
         frame = self.stack.pop()
         if len(self.stack) < self.handling:
             self.handling = 0
@@ -166,16 +166,16 @@ class Thread:
     def interrupt(self, entry: int, t: float) -> None:
         """Call a subroutine before the next line, in the middle of a hold too. Raises Fault (43)."""
         holding = self._hold_until > t
-        self.push(Frame(self.pc, self.waiting, self._hold_until if holding else -inf, self.ending))
+        self.push(CallFrame(self.pc, self.waiting, self._hold_until if holding else -inf, self.ending))
         if self.waiting or holding or self.ending:
             self.next_at, self._hold_until = t, -inf
         self.waiting = self.ending = False
         self.pc = entry
         self.refresh()
 
-    def push(self, frame: Frame) -> None:
+    def push(self, frame: CallFrame) -> None:
         if len(self.stack) >= STACK_DEPTH:
-            raise Fault(E.STACK_FULL, fatal=True)
+            raise DriveFault(E.STACK_FULL, fatal=True)
         self.stack.append(frame)
 
 
@@ -186,7 +186,7 @@ class ProgramMode:
     share one table (manual 3.2.2, 3.3.1, 5.1.71, 5.1.136).
     """
 
-    def __init__(self, memory: Memory, program: Program, linked: LinkedProgram) -> None:
+    def __init__(self, memory: Memory, program: ProgramContents, linked: LinkedProgram) -> None:
         self._memory, self._program, self._linked = memory, program, linked
         self.address: int | None = None
 
@@ -206,29 +206,29 @@ class ProgramMode:
         """Check that a name may be given. Raises Fault (24 bad or reserved, 28 taken, 29 a mnemonic)."""
         row = lookup(word, self._memory.product)
         if row is not None:
-            raise Fault(E.ILLEGAL_DATA if row.kind == "reserved" else E.NAME_IS_COMMAND)
+            raise DriveFault(E.ILLEGAL_DATA if row.kind == "reserved" else E.NAME_IS_COMMAND)
         if not is_name(word) or len(word) > self._memory.model.longest_name:
-            raise Fault(E.ILLEGAL_DATA)
+            raise DriveFault(E.ILLEGAL_DATA)
         if word in self._program.labels or self._memory.scopes.get(word) == "G":
-            raise Fault(E.NAME_EXISTS)
+            raise DriveFault(E.NAME_EXISTS)
 
     def check_room(self) -> None:
         """Check that one more name fits. Raises Fault (31)."""
         if len(self._program.labels) + len(self._memory.scopes) >= TABLE_SIZE:
-            raise Fault(E.NAME_TABLE_FULL)
+            raise DriveFault(E.NAME_TABLE_FULL)
 
     def _new_label(self, statement: Statement) -> str:
         """The name that an LB line gives. Raises Fault (24, 28, 29, 31)."""
         name = statement.arguments[0]
-        if not isinstance(name, Name):
-            raise Fault(E.ILLEGAL_DATA)
+        if not isinstance(name, NameTerm):
+            raise DriveFault(E.ILLEGAL_DATA)
         if name.word == "SU":
             if "SU" in self._program.labels:
-                raise Fault(E.NAME_EXISTS)
+                raise DriveFault(E.NAME_EXISTS)
         else:
             self.check_new(name.word)
             if name.word in self._memory.scopes or name.word in self._program.declared:
-                raise Fault(E.NAME_EXISTS)
+                raise DriveFault(E.NAME_EXISTS)
         self.check_room()
         return name.word
 
@@ -297,7 +297,7 @@ class Interpreter:
     def break_here(self) -> None:
         """BP alone: step from here on. Raises Fault (40)."""
         if not self._thread.running:
-            raise Fault(E.NO_PROGRAM_RUNNING)
+            raise DriveFault(E.NO_PROGRAM_RUNNING)
         self._thread.step_from_here()
 
     def _at_break(self, pc: int) -> bool:
@@ -335,7 +335,7 @@ class Interpreter:
             thread.next_at = at + period
             try:
                 actions[pc]()
-            except Fault as fault:
+            except DriveFault as fault:
                 self._on_fault(fault)
         thread.executed += count
 
@@ -356,7 +356,7 @@ class Interpreter:
             thread.executed += 1
             try:
                 linked.actions[pc]()
-            except Fault as fault:
+            except DriveFault as fault:
                 self._on_fault(fault)
             if self._after is not None:
                 self._after(pc)
@@ -377,7 +377,7 @@ class Interpreter:
             return
         try:
             self._call_between_lines(target, t)
-        except Fault as fault:
+        except DriveFault as fault:
             self._on_fault(fault)
 
     def _call_between_lines(self, target: Argument, t: float) -> None:
@@ -385,7 +385,7 @@ class Interpreter:
             self._thread.interrupt(self.linked.place(target), t)
         else:  # its RT ends it
             self._begin(self.linked.entry(target), t, NORMAL)
-            self._thread.push(Frame(len(self.linked.actions) - 1))
+            self._thread.push(CallFrame(len(self.linked.actions) - 1))
 
     def raise_error(self, code: int) -> None:
         """Set an error that no line has caused, and call its handler."""
@@ -405,13 +405,13 @@ class Interpreter:
             return False
         try:
             self._call_between_lines(self.handler, t)
-        except Fault:
+        except DriveFault:
             return False
         self._thread.handling = len(self._thread.stack)
         self._errors.handled()
         return True
 
-    def _on_fault(self, fault: Fault) -> None:
+    def _on_fault(self, fault: DriveFault) -> None:
         """Act on an error in a line: without a handler the next one follows, unless there is none to follow."""
         self._errors.set(fault.code)
         if not self.on_error(self._timeline.now) and fault.fatal:
@@ -426,10 +426,10 @@ class Core:
     ) -> None:
         self.memory, self.values, self.model, self.world = memory, memory.values, memory.model, world
         self.timeline = Timeline()
-        self.program = Program(product=memory.product)
+        self.program = ProgramContents(product=memory.product)
         self.errors = ErrorFlag(memory.values, memory.model.codes, self.timeline)
-        self.thread = Thread(self.timeline)
-        self.printer = Printer(self.timeline, memory.model.waits_to_print, self.thread.delay)
+        self.thread = ProgramThread(self.timeline)
+        self.printer = DriveOutput(self.timeline, memory.model.waits_to_print, self.thread.delay)
         self.interpreter = Interpreter(self, period, compile_line)
         self.errors.line = self.interpreter.line
         self.mode = ProgramMode(memory, self.program, self.interpreter.linked)

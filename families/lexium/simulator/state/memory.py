@@ -12,10 +12,10 @@ from multidrop.families.lexium.manual.grammar import Argument
 from multidrop.families.lexium.manual.groups import BANKED, COUNTED, STATES, UNIT
 from multidrop.families.lexium.manual.mnemonic import Mnemonic
 from multidrop.families.lexium.manual.table import lookup, words
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 from multidrop.families.lexium.simulator.state.expressions import Value, whole
 from multidrop.families.lexium.simulator.state.models import MODELS
-from multidrop.families.lexium.simulator.state.program_memory import Program
+from multidrop.families.lexium.simulator.state.program_memory import ProgramContents
 
 
 class Trip(NamedTuple):
@@ -35,7 +35,7 @@ ENCODER_MS = 256
 
 
 @dataclass
-class Store:
+class NonVolatileMemory:
     """Everything that NVM keeps (manual 5.1.113)."""
 
     values: dict[str, Value] = field(default_factory=dict)
@@ -46,7 +46,7 @@ class Store:
     outputs: dict[int, tuple[int, ...]] = field(default_factory=dict)
     limits: dict[int, tuple[int, ...]] = field(default_factory=dict)
     trips: dict[int, Trip] = field(default_factory=dict)
-    program: Program = field(default_factory=Program)
+    program: ProgramContents = field(default_factory=ProgramContents)
 
 
 def slot(name: str) -> str:
@@ -70,14 +70,14 @@ def row_of(word: str, product: str) -> Mnemonic | None:
     """The table's row of a word that a product knows; None where it is a free name. Raises Fault (37)."""
     row = lookup(word, product)
     if row is not None and product not in row.products:
-        raise Fault(E.NOT_AVAILABLE)
+        raise DriveFault(E.NOT_AVAILABLE)
     return row
 
 
 def within(value: Value, low: Value, high: Value) -> Value:
     """A value in a range. Raises Fault (21)."""
     if not low <= value <= high:
-        raise Fault(E.OUT_OF_RANGE)
+        raise DriveFault(E.OUT_OF_RANGE)
     return value
 
 
@@ -188,7 +188,7 @@ class Memory:
         """A whole number that a word takes. Raises Fault (21, 37)."""
         number, row = whole(value), self.row(word)
         if row is None or not row.accepts(number, self.counting):
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         return number
 
     def flag(self, word: str, value: Value) -> int:
@@ -199,7 +199,7 @@ class Memory:
         row, number = self.row(word), whole(value)
         writable = row is not None and row.access == "RW" and row.accepts(number)
         if number != 0 and not writable:
-            raise Fault(E.OUT_OF_RANGE)
+            raise DriveFault(E.OUT_OF_RANGE)
         return number
 
     # Names that a user gives, and IV.
@@ -229,13 +229,13 @@ class Memory:
         del self.scopes[name]
         self.values.pop(slot(name), None)
 
-    def save(self, store: Store) -> None:
+    def save(self, store: NonVolatileMemory) -> None:
         users = {slot(name) for name in self.scopes}
         store.values = {key: value for key, value in self.values.items() if key not in STATES and key not in users}
         store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}
         store.users = {name: self.values[slot(name)] for name, scope in self.scopes.items() if scope == "G"}
 
-    def load(self, store: Store) -> None:
+    def load(self, store: NonVolatileMemory) -> None:
         """Take back what NVM keeps; global variables made since stay."""
         self.values.update(store.values)
         self.bank.update(store.bank)

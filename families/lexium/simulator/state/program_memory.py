@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from multidrop.families.lexium.manual.errors import ErrorNumber as E
-from multidrop.families.lexium.manual.grammar import Argument, Compare, Name, Number, Statement
+from multidrop.families.lexium.manual.grammar import Argument, Compare, NameTerm, Number, Statement
 from multidrop.families.lexium.manual.statements import size_of
 from multidrop.families.lexium.manual.table import lookup
-from multidrop.families.lexium.simulator.state.errors import Fault
+from multidrop.families.lexium.simulator.state.errors import DriveFault
 
-FIRST, SPACE = 1, 6384
+FIRST_ADDRESS, PROGRAM_BYTES = 1, 6384
 """The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""
 
 
-class Line(NamedTuple):
+class StoredLine(NamedTuple):
     """A stored line: its address, its size in bytes, its text as it came, and what it says."""
 
     address: int
@@ -30,10 +30,10 @@ class Line(NamedTuple):
 
 
 @dataclass
-class Program:
+class ProgramContents:
     """What program memory holds. `declared` are the variables of its VA lines, `product` is whose words count."""
 
-    lines: dict[int, Line] = field(default_factory=dict)
+    lines: dict[int, StoredLine] = field(default_factory=dict)
     labels: dict[str, int] = field(default_factory=dict)
     order: list[int] = field(default_factory=list)
     product: str = ""
@@ -45,21 +45,21 @@ class Program:
             self._declared = {name for line in self.lines.values() if (name := declared_by(line.statement))}
         return self._declared
 
-    def copy(self) -> Program:
-        return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
+    def copy(self) -> ProgramContents:
+        return ProgramContents(dict(self.lines), dict(self.labels), list(self.order), self.product)
 
-    def load(self, other: Program) -> None:
+    def load(self, other: ProgramContents) -> None:
         self.lines, self.labels, self.order = dict(other.lines), dict(other.labels), list(other.order)
         self._declared = None
 
     def store(self, address: int, text: str, statement: Statement) -> int:
         """Store a line, and delete those that it overlaps. Return the next address. Raises Fault (45)."""
         size = size_of(statement, self.product)
-        if address + size > FIRST + SPACE:
-            raise Fault(E.PROGRAM_MEMORY_FULL)
+        if address + size > FIRST_ADDRESS + PROGRAM_BYTES:
+            raise DriveFault(E.PROGRAM_MEMORY_FULL)
         if self._make_room(address, address + size) or declared_by(statement):
             self._declared = None
-        self.lines[address] = Line(address, size, text, statement)
+        self.lines[address] = StoredLine(address, size, text, statement)
         insort(self.order, address)
         return address + size
 
@@ -67,23 +67,23 @@ class Program:
         """The address that a label or a number means. Raises Fault (30, 34, 42)."""
         if isinstance(target, Number):
             if target.value not in self.lines:
-                raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
+                raise DriveFault(E.NO_SUCH_ADDRESS, fatal=True)
             return int(target.value)
-        if not isinstance(target, Name):
-            raise Fault(E.ILLEGAL_DATA)
+        if not isinstance(target, NameTerm):
+            raise DriveFault(E.ILLEGAL_DATA)
         if target.word in self.labels:
             return self.labels[target.word]
         row = lookup(target.word, self.product)
         if row and row.kind == "reserved":
-            raise Fault(E.ILLEGAL_DATA, fatal=True)
-        raise Fault(E.NOT_EXECUTABLE if row and row.name != "SU" else E.NO_SUCH_NAME, fatal=True)
+            raise DriveFault(E.ILLEGAL_DATA, fatal=True)
+        raise DriveFault(E.NOT_EXECUTABLE if row and row.name != "SU" else E.NO_SUCH_NAME, fatal=True)
 
     def check(self, target: Argument | None) -> None:
         """Check that a place exists, for an instruction that only names it. Raises Fault, which ends no program."""
         try:
             self.resolve(target)
-        except Fault as fault:
-            raise Fault(fault.code) from None
+        except DriveFault as fault:
+            raise DriveFault(fault.code) from None
 
     def clear(self, start: int = 0) -> None:
         """Delete the lines from an address on, with their labels."""
@@ -93,7 +93,7 @@ class Program:
         del self.order[bisect_left(self.order, start) :]
         self.labels = {name: at for name, at in self.labels.items() if at < start}
 
-    def listing(self, start: int = FIRST) -> list[str]:
+    def listing(self, start: int = FIRST_ADDRESS) -> list[str]:
         """Address, two spaces, text: a row for each line from an address on."""
         return [f"{address}  {self.lines[address].text}" for address in self.order if address >= start]
 
@@ -116,7 +116,7 @@ def declared_by(statement: Statement) -> str:
     first = statement.arguments[0]
     if isinstance(first, Compare):
         first = first.left
-    return first.word if isinstance(first, Name) else ""
+    return first.word if isinstance(first, NameTerm) else ""
 
 
 Action = Callable[[], None]
@@ -131,7 +131,7 @@ class LinkedProgram:
     of the targets that were resolved; it is another dictionary whenever they may have moved.
     """
 
-    def __init__(self, program: Program, compile_line: Callable[[Statement], Action], finish: Action) -> None:
+    def __init__(self, program: ProgramContents, compile_line: Callable[[Statement], Action], finish: Action) -> None:
         self._program, self._compile_line, self._finish = program, compile_line, finish
         self.actions: list[Action] = [finish]
         self.texts: list[str] = [""]
@@ -157,7 +157,7 @@ class LinkedProgram:
         if place is None:
             address = self._program.resolve(target)
             if address not in self.index:
-                raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
+                raise DriveFault(E.NO_SUCH_ADDRESS, fatal=True)
             place = self.places[target] = self.index[address]
         return place
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS, ROWS, Register
+from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS, ROWS, ModbusRegister
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from tests.support.cases import for_each
@@ -73,11 +73,11 @@ class Drive:
         return int(self.device.memory.values["ER"])
 
 
-def row_of(name: str) -> Register:
+def row_of(name: str) -> ModbusRegister:
     return REGISTERS[name]
 
 
-def words_of(row: Register, value: int) -> list[int]:
+def words_of(row: ModbusRegister, value: int) -> list[int]:
     return [value >> 16 * place & 0xFFFF for place in range(row.count)]
 
 

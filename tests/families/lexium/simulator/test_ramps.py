@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.simulator.kinematics import SINUSOIDAL, TRIANGLE, Pace, Shape, meeting, move, slew
+from multidrop.simulator.kinematics import SINUSOIDAL, TRIANGLE, MotionPace, Shape, meeting, move, slew
 from tests.support.lexium import at, drive, rotor, say
 
 PACE = {"vi": 1000.0, "vm": 768_000.0, "a": 1e6, "d": 1e6}
@@ -16,7 +16,7 @@ PACE = {"vi": 1000.0, "vm": 768_000.0, "a": 1e6, "d": 1e6}
 @pytest.mark.parametrize("jerk", [0, 64, 127])
 def test_a_move_lasts_as_long_whatever_the_shape_of_its_ramps(kind, jerk):
     shape = Shape(kind, jerk)
-    profile = move(0, 0, 0, 3_840_000, Pace(**PACE, up=shape, down=shape))
+    profile = move(0, 0, 0, 3_840_000, MotionPace(**PACE, up=shape, down=shape))
     assert profile.end == pytest.approx(5.7660013, abs=1e-6)
     assert profile.position(0.767) == pytest.approx(294_911.5, abs=1e-3)
     assert profile.velocity(0.3835) == pytest.approx(384_500)
@@ -32,21 +32,23 @@ def test_a_move_lasts_as_long_whatever_the_shape_of_its_ramps(kind, jerk):
     ],
 )
 def test_the_shapes_have_their_velocity_a_quarter_on_and_their_peak_in_the_middle(shape, quarter, peak):
-    profile = slew(0, 0, 0, 768_000, Pace(vi=1000, vm=inf, a=1e6, d=1e6, up=shape))
+    profile = slew(0, 0, 0, 768_000, MotionPace(vi=1000, vm=inf, a=1e6, d=1e6, up=shape))
     assert profile.velocity(0.767 / 4) == pytest.approx(quarter, rel=1e-9)
     assert profile.acceleration(0.767 / 2) == pytest.approx(peak)
     assert profile.acceleration(1e-9) == pytest.approx(0, abs=1) and profile.changing(0)
 
 
 def test_a_sinusoidal_ramp_is_gentler_at_its_ends_than_a_triangle():
-    early = [slew(0, 0, 0, 1e6, Pace(vi=1, vm=inf, a=1e6, d=1, up=Shape(kind))).acceleration(0.05) for kind in (2, 3)]
+    early = [
+        slew(0, 0, 0, 1e6, MotionPace(vi=1, vm=inf, a=1e6, d=1, up=Shape(kind))).acceleration(0.05) for kind in (2, 3)
+    ]
     assert early[0] == pytest.approx(2e5, rel=1e-5)
     assert early[1] == pytest.approx(2e6 * sin(pi * 0.05) ** 2, rel=1e-4) and early[1] < early[0]
 
 
 @given(st.integers(2, 3), st.integers(0, 127), st.floats(-4e6, 4e6), st.floats(0, 1))
 def test_a_crossing_of_an_s_curve_is_where_the_position_says(kind, jerk, target, part):
-    profile = move(0, 0, 0, target, Pace(**PACE, up=Shape(kind, jerk), down=Shape(kind, jerk)))
+    profile = move(0, 0, 0, target, MotionPace(**PACE, up=Shape(kind, jerk), down=Shape(kind, jerk)))
     mark = profile.position(part * profile.end)
     found = profile.crossing(mark, 0)
     if 0 < part < 1 and abs(target) > 1:
@@ -55,12 +57,12 @@ def test_a_crossing_of_an_s_curve_is_where_the_position_says(kind, jerk, target,
 
 
 def test_two_motions_meet_where_both_are_at_one_place():
-    ahead = slew(0, 1000, 0, 500, Pace(vi=500, vm=inf, a=1, d=1))
-    behind = slew(0, 0, 0, 700, Pace(vi=700, vm=inf, a=1, d=1))
+    ahead = slew(0, 1000, 0, 500, MotionPace(vi=500, vm=inf, a=1, d=1))
+    behind = slew(0, 0, 0, 700, MotionPace(vi=700, vm=inf, a=1, d=1))
     assert meeting(behind, ahead, 0, 0) == pytest.approx(5)
     assert meeting(behind, ahead, -300, 0) == pytest.approx(3.5)
     assert meeting(ahead, behind, 2000, 0) == inf
-    assert meeting(slew(0, 0, 0, -1, Pace(vi=1, vm=inf, a=1, d=1)), ahead, 0, 0) == inf
+    assert meeting(slew(0, 0, 0, -1, MotionPace(vi=1, vm=inf, a=1, d=1)), ahead, 0, 0) == inf
 
 
 def test_a_drive_makes_s_curves_and_says_where_it_cannot():

@@ -7,16 +7,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.families.pmx.manual import program_file, script_checker
-from multidrop.families.pmx.manual.script_compiler import LINES, OPERATION, looks_compiled, split
+from multidrop.families.pmx.manual.script_compiler import MEMORY_LINES, OPERATION, looks_compiled, split
 from multidrop.families.pmx.manual.script_parser import WORDS
 from multidrop.families.pmx.simulator.device import PmxDevice
-from multidrop.families.pmx.simulator.programs import Programs
+from multidrop.families.pmx.simulator.programs import PmxInterpreter
 from multidrop.simulator.cell.spec import DriveSpec
 
 IDLE, RUNNING, ERROR = 0, 1, 4
 
 
-def ran(*lines: str, until: float = 10.0, **variables: int) -> Programs:
+def ran(*lines: str, until: float = 10.0, **variables: int) -> PmxInterpreter:
     """Program 0 of a controller whose memory holds these lines, after some seconds."""
     spec = DriveSpec(personality="PMX", name="00")
     made = PmxDevice(spec).programs
@@ -149,7 +149,7 @@ def test_lines_without_places_are_the_memory_from_its_beginning() -> None:
         ("PS0\nX1000\nXX\n", 2, "'X1000' is not a compiled line, but others are"),
         ("PS0\nSA1=XX\nXX\n", 1, "'PS0' is not a compiled line, but others are"),
         ("CV10 VR1 VR10 OX3\nXX\nXX\n", 1, "is not a compiled line"),
-        ("PS0\n" + "EI0\n" * LINES, LINES + 1, "1276 compiled lines, and the controller holds 1275"),
+        ("PS0\n" + "EI0\n" * MEMORY_LINES, MEMORY_LINES + 1, "1276 compiled lines, and the controller holds 1275"),
         (f"PS0\n&{'A' * 40}$1\nXX", 2, "40 printable characters at most"),
     ],
 )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from multidrop.families.pmx.manual.script_checker import read
-from multidrop.families.pmx.manual.script_compiler import LINES
+from multidrop.families.pmx.manual.script_compiler import MEMORY_LINES
 from multidrop.families.pmx.simulator.commands import CommandedController
-from multidrop.families.pmx.simulator.programs import Programs
+from multidrop.families.pmx.simulator.programs import PmxInterpreter
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, TWO, WATCHDOG
 
 SPEED = 10_000.0
@@ -75,14 +75,14 @@ class Stand(CommandedController):
         return self.trouble[axis]
 
 
-def loaded(text: str, stand: Stand | None = None) -> tuple[Programs, Stand]:
+def loaded(text: str, stand: Stand | None = None) -> tuple[PmxInterpreter, Stand]:
     stand = stand or Stand()
-    programs = Programs(stand)
+    programs = PmxInterpreter(stand)
     programs.memory.load(read(text, "x.prg").code)
     return programs, stand
 
 
-def ran(text: str, until: float = 10.0, stand: Stand | None = None) -> tuple[Programs, Stand]:
+def ran(text: str, until: float = 10.0, stand: Stand | None = None) -> tuple[PmxInterpreter, Stand]:
     """Program 0, started at time 0."""
     programs, stand = loaded(text, stand)
     assert programs.control(0, 1, 0.0)
@@ -92,7 +92,7 @@ def ran(text: str, until: float = 10.0, stand: Stand | None = None) -> tuple[Pro
 
 def test_lines_are_kept_as_they_came_and_read_again() -> None:
     memory = loaded("X1\nEND")[0].memory
-    assert [memory.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and memory.line(LINES - 1) == "0"
+    assert [memory.line(n) for n in range(4)] == ["CV1", "&X$1", "XX", "0"] and memory.line(MEMORY_LINES - 1) == "0"
     assert memory.store(7, "&1234$56") and memory.line(7) == "&1234$56"
     assert not memory.store(7, "") and not memory.store(7, "A B") and not memory.store(7, "X" * 25)
 
@@ -303,9 +303,11 @@ def test_calls_without_end_are_an_error() -> None:
     assert programs.status(0) == ERROR and "32 nested calls" in programs.failure(0)
 
 
-@pytest.mark.parametrize("lines", [["&1234$5"], ["AM"], ["CV1"] * LINES, ["SE"], ["JR5"], ["CV1", "CV2", "AM"], ["0"]])
+@pytest.mark.parametrize(
+    "lines", [["&1234$5"], ["AM"], ["CV1"] * MEMORY_LINES, ["SE"], ["JR5"], ["CV1", "CV2", "AM"], ["0"]]
+)
 def test_lines_that_mean_nothing_are_an_error(lines: list[str]) -> None:
-    programs = Programs(Stand())
+    programs = PmxInterpreter(Stand())
     programs.memory.load(lines)
     programs.control(0, 1, 0.0)
     programs.advance(10.0)

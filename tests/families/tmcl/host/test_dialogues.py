@@ -19,14 +19,14 @@ from multidrop.families.tmcl.host.programs import TmclDebugging, TmclPrograms
 from multidrop.families.tmcl.host.units import TmclUnits
 from multidrop.families.tmcl.host.values import TmclActions, TmclParameters, TmclValues
 from multidrop.families.tmcl.manual import commands, program_file
-from multidrop.families.tmcl.manual.commands import Call, Command
+from multidrop.families.tmcl.manual.commands import Command, TmclCall
 from multidrop.families.tmcl.manual.modules import module_of
 from tests.support.dialogues import dialogue_tests
 
 USED = (
     replace, Hints, Kind, Owed, Priority, Started, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored,
     family, TmclFamily, codec, motions, operations, programs, units, values, TmclMotions, TmclDebugging,
-    TmclPrograms, TmclUnits, TmclActions, TmclParameters, TmclValues, Call, Command, module_of, ORDINARY, Change,
+    TmclPrograms, TmclUnits, TmclActions, TmclParameters, TmclValues, TmclCall, Command, module_of, ORDINARY, Change,
     Permission, Plan, Readings,
 )  # fmt: skip
 """The names that calls in the files use."""

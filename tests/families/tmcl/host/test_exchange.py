@@ -14,8 +14,8 @@ from multidrop.dialects.state import Owed
 from multidrop.drives.line import Line
 from multidrop.families.tmcl.host.codec import Tmcl
 from multidrop.families.tmcl.host.family import TmclFamily
-from multidrop.families.tmcl.manual.commands import Call, Command, Status
-from multidrop.families.tmcl.simulator.module import Refused as Lacking
+from multidrop.families.tmcl.manual.commands import Command, Status, TmclCall
+from multidrop.families.tmcl.simulator.module import ModuleRefusal
 from multidrop.simulator.cell.spec import Faults
 from tests.conftest import Bench
 from tests.support.cases import for_each
@@ -405,7 +405,7 @@ def test_whether_a_program_runs_is_read_by_135_or_global_parameter_128(without, 
 
     def lacking(call, now):
         if call.command in without:
-            raise Lacking(Status.INVALID_COMMAND)
+            raise ModuleRefusal(Status.INVALID_COMMAND)
         return execute(call, now)
 
     monkeypatch.setattr(device, "_execute", lacking)
@@ -442,7 +442,7 @@ def test_a_harmed_frame_turns_no_module_otherwise_than_typed_and_gives_no_wrong_
             assert shop.type(state, "GAP 4, 0") == (value,)
     assert shop.count(Command.ROR) <= 2
     for device in shop.devices.values():
-        assert device.execute(Call(Command.GAP, 2), shop.now).value in (0, 700)
+        assert device.execute(TmclCall(Command.GAP, 2), shop.now).value in (0, 700)
 
 
 @pytest.mark.parametrize(("option", "counted"), [(0, "counts from the last target"), (1, "counts from here")])

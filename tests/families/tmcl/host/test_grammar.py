@@ -4,22 +4,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.families.tmcl.manual.commands import Call, Command, LineError, parse
+from multidrop.families.tmcl.manual.commands import Command, TmclCall, TmclLineError, parse
 
 LINES = [
-    ("ROR 0, 1000", Call(1, 0, 0, 1000)),
-    ("rol 0,-5", Call(2, 0, 0, -5)),
-    ("MST 2", Call(3, 0, 2, 0)),
-    ("MVP ABS, 0, 51200", Call(4, 0, 0, 51200)),
-    ("MVP rel, 1, -1000", Call(4, 1, 1, -1000)),
-    ("MVP 1, 1, +7", Call(4, 1, 1, 7)),
-    ("  SAP 4 , 0 , 100000 ", Call(5, 4, 0, 100000)),
-    ("GAP 1, 0", Call(6, 1, 0, 0)),
-    ("STAP 4, 0", Call(7, 4, 0, 0)),
-    ("SGP 66, 0, 3", Call(9, 66, 0, 3)),
-    ("GGP 66, 0", Call(10, 66, 0, 0)),
-    ("RFS STATUS, 0", Call(13, 2, 0, 0)),
-    ("137 0, 0, 1234", Call(137, 0, 0, 1234)),
+    ("ROR 0, 1000", TmclCall(1, 0, 0, 1000)),
+    ("rol 0,-5", TmclCall(2, 0, 0, -5)),
+    ("MST 2", TmclCall(3, 0, 2, 0)),
+    ("MVP ABS, 0, 51200", TmclCall(4, 0, 0, 51200)),
+    ("MVP rel, 1, -1000", TmclCall(4, 1, 1, -1000)),
+    ("MVP 1, 1, +7", TmclCall(4, 1, 1, 7)),
+    ("  SAP 4 , 0 , 100000 ", TmclCall(5, 4, 0, 100000)),
+    ("GAP 1, 0", TmclCall(6, 1, 0, 0)),
+    ("STAP 4, 0", TmclCall(7, 4, 0, 0)),
+    ("SGP 66, 0, 3", TmclCall(9, 66, 0, 3)),
+    ("GGP 66, 0", TmclCall(10, 66, 0, 0)),
+    ("RFS STATUS, 0", TmclCall(13, 2, 0, 0)),
+    ("137 0, 0, 1234", TmclCall(137, 0, 0, 1234)),
 ]
 WRONG = [
     ("", "no command ''"),
@@ -47,17 +47,17 @@ def test_what_a_line_says(text, call):
 
 @pytest.mark.parametrize(("text", "why"), WRONG)
 def test_a_wrong_line_says_why_and_what_is_valid(text, why):
-    with pytest.raises(LineError) as raised:
+    with pytest.raises(TmclLineError) as raised:
         parse(text)
     assert why in str(raised.value)
 
 
 @given(st.integers(0, 255), st.integers(0, 255), st.integers(0, 255), st.integers(-(2**31), 2**31 - 1))
 def test_what_a_command_is_written_as_says_the_same(command, kind, motor, value):
-    call = Call(command, kind, motor, value)
+    call = TmclCall(command, kind, motor, value)
     if call.row is not None:  # what the word has no field for is 0
         fields = call.row.fields
-        call = Call(command, kind if "type" in fields else 0, motor, value if "value" in fields else 0)
+        call = TmclCall(command, kind if "type" in fields else 0, motor, value if "value" in fields else 0)
     assert parse(str(call)) == call
 
 
@@ -65,7 +65,7 @@ def test_what_a_command_is_written_as_says_the_same(command, kind, motor, value)
 def test_any_text_is_a_command_or_a_line_error(text):
     try:
         call = parse(text)
-    except LineError as error:
+    except TmclLineError as error:
         assert str(error)
     else:
         assert call.command in range(256)

@@ -14,7 +14,7 @@ from multidrop.base.files import SourceLine
 from multidrop.dialects.families import correct_in, program_language_of
 from multidrop.dialects.program_files import errors
 from multidrop.families.tmcl.manual import instructions, program_file
-from multidrop.families.tmcl.manual.commands import Call
+from multidrop.families.tmcl.manual.commands import TmclCall
 from multidrop.families.tmcl.manual.editing import EDITING
 from multidrop.families.tmcl.manual.program_file import assembled, check, compiled, disassembled, formatted
 from tests.support.cases import for_each
@@ -73,7 +73,7 @@ WORDS = [  # the worked examples of the TMCM-1290 manual, and each further word
 ]
 
 
-def only(text: str) -> Call:
+def only(text: str) -> TmclCall:
     (line,) = assembled([SourceLine(1, text)]).lines
     return line.call
 
@@ -105,8 +105,8 @@ def test_labels_constants_and_remarks() -> None:
     text = "Far = 0x64 // a place\nAlso = far\nLoop: MVP ABS, 0, Far\n\n  wait pos, 0, 0 ; there\n  JA loop\n"
     text += "  MVP ABS,0,ALSO\n"
     lines = compiled(program_file.read(text, "a.tmc"))
-    move = Call(4, 0, 0, 100)
-    assert [each.call for each in lines] == [move, Call(27, 1), Call(22, value=0), move]
+    move = TmclCall(4, 0, 0, 100)
+    assert [each.call for each in lines] == [move, TmclCall(27, 1), TmclCall(22, value=0), move]
     assert [each.source for each in lines] == [3, 5, 6, 7]
 
 
@@ -179,18 +179,18 @@ def test_canonical_spelling() -> None:
     assert formatted(text) == "loop: MVP ABS, 0, Far// go\n\tJA loop\nFar = 5\n"
 
 
-def calls() -> st.SearchStrategy[Call]:
+def calls() -> st.SearchStrategy[TmclCall]:
     """Lines of a memory: any seven bytes, and such as a word gives."""
     byte, value = st.integers(0, 255), st.integers(-(2**31), 2**31 - 1)
     known = st.sampled_from(sorted(instructions.ROWS))
     number = st.integers(1, 127)
     small = st.integers(-1, 20)
-    return st.builds(Call, number | known, byte | st.integers(0, 12), byte | st.just(0), value | small)
+    return st.builds(TmclCall, number | known, byte | st.integers(0, 12), byte | st.just(0), value | small)
 
 
 @examples(100, nightly=2000)
 @given(st.lists(calls(), max_size=30))
-def test_the_file_of_a_memory_gives_the_same_memory(memory: list[Call]) -> None:
+def test_the_file_of_a_memory_gives_the_same_memory(memory: list[TmclCall]) -> None:
     text = "\n".join(disassembled(dict(enumerate(memory))))
     assert not errors(check(text))
     assert [

@@ -15,7 +15,7 @@ from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 from multidrop.families.tmcl.host.family import TmclFamily
 from multidrop.families.tmcl.host.programs import TmclPrograms
 from multidrop.families.tmcl.manual import instructions, program_file
-from multidrop.families.tmcl.manual.commands import Call, Command
+from multidrop.families.tmcl.manual.commands import Command, TmclCall
 from tests.families.tmcl.host.test_exchange import Shop
 
 pytestmark = pytest.mark.slow
@@ -65,8 +65,8 @@ def test_a_stored_line_comes_in_place_of_status_and_command() -> None:
     shop, state = opened()
     load(shop, state, "SAP 101, 0, -2\nSTOP")
     device = shop.devices["1"]
-    answer = device.execute(Call(Command.READ_PROGRAM, value=0), shop.now)
-    assert answer.line == Call(5, 101, 0, -2)
+    answer = device.execute(TmclCall(Command.READ_PROGRAM, value=0), shop.now)
+    assert answer.line == TmclCall(5, 101, 0, -2)
     assert shop.type(state, "134 0, 0, 0") == ("SAP 101, 0, -2",)
     assert not state.programming, "the type 101 of a line is no status"
     assert shop.type(state, "134 0, 0, 1") == ("STOP",)
@@ -125,14 +125,16 @@ def test_a_stop_in_a_download_ends_it_and_is_told() -> None:
 def test_routines_at_other_addresses_are_listed_with_a_gap_and_come_back() -> None:
     shop, state = opened()
     device = shop.devices["1"]
-    device.program.load({0: Call(28), 50: Call(3), 51: Call(22, value=50)})
+    device.program.load({0: TmclCall(28), 50: TmclCall(3), 51: TmclCall(22, value=50)})
     upload = shop.run(programs.TmclPrograms(state).upload(raw=False))
     assert upload[:2] == ("    STOP", "    0 0, 0, 0") and upload[-3:] == ("Line50:", "    MST 0", "    JA Line50")
     memory = list(device.program.memory)
     device.program.load({})
     load(shop, state, "\n".join(upload))
     assert list(device.program.memory) == memory
-    assert TmclPrograms(TmclState(Tmcl(), "1")).readable(programs.held_of({0: Call(28), 1: Call(22, value=0)})) == (
+    assert TmclPrograms(TmclState(Tmcl(), "1")).readable(
+        programs.held_of({0: TmclCall(28), 1: TmclCall(22, value=0)})
+    ) == (
         "0  Line0: STOP",
         "1         JA Line0",
     )
@@ -147,7 +149,7 @@ def test_routines_at_other_addresses_are_listed_with_a_gap_and_come_back() -> No
 def test_what_upload_writes_downloads_to_the_same_memory(numbers: list[int], kind: int, value: int) -> None:
     shop, state = opened()
     device = shop.devices["1"]
-    device.program.load({at: Call(number, kind, 0, value) for at, number in enumerate(numbers)})
+    device.program.load({at: TmclCall(number, kind, 0, value) for at, number in enumerate(numbers)})
     memory = list(device.program.memory)
     for raw in (False, True):
         text = "\n".join(shop.run(programs.TmclPrograms(state).upload(raw)))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from multidrop.dialects import End, Kind, Reply
-from multidrop.dialects.scanning import Outcome, Reach
+from multidrop.dialects.scanning import Reach, SearchOutcome
 from multidrop.families.tmcl.host import scan
 from multidrop.families.tmcl.host.codec import call_of
-from multidrop.families.tmcl.manual.commands import Axis, Command
+from multidrop.families.tmcl.manual.commands import AxisParameter, Command
 from tests.support.procedure import ProcedureRunner
 
 BINARY = 1241 << 16 | 0x10F
@@ -37,7 +37,7 @@ class Bus:
             return Reply(raw=heard.pop(0)) if heard else Reply(end=End.TIMEOUT)
         if self.count in self.lost or str(address) not in self.modules:
             return Reply(end=End.TIMEOUT)
-        if call.command == Command.GAP and (call.type, call.motor) == (Axis.ACTUAL_POSITION, 1):
+        if call.command == Command.GAP and (call.type, call.motor) == (AxisParameter.ACTUAL_POSITION, 1):
             return Reply(("4",), End.REFUSED, body=frame(address, 4, 6, 0))
         value = BINARY if call.command == Command.VERSION else 0
         heard = frame(address, 100, call.command, value)
@@ -71,13 +71,13 @@ def whole(known, window=0.05):
 
 def test_each_address_is_asked_once_and_a_module_that_replied_behind_each_block():
     bus = Bus("1")
-    assert searched(bus) == (Outcome(), [("1", "TMCM-1241", 1)], 255)
+    assert searched(bus) == (SearchOutcome(), [("1", "TMCM-1241", 1)], 255)
     assert bus.asked == whole(1)
 
 
 def test_the_window_of_a_slow_line_is_added_to_the_gap():
     bus = Bus("1")
-    assert searched(bus, window=0.2) == (Outcome(), [("1", "TMCM-1241", 1)], 255)
+    assert searched(bus, window=0.2) == (SearchOutcome(), [("1", "TMCM-1241", 1)], 255)
     assert bus.asked == whole(1, 0.23)
 
 
@@ -91,7 +91,7 @@ def test_the_module_that_replied_last_is_the_one_that_shows_the_count():
 def test_a_block_without_a_module_is_asked_again_after_a_second_of_silence():
     bus = Bus("200")
     outcome, found, steps = searched(bus)
-    assert (outcome, [address for address, _, _ in found], steps) == (Outcome(), ["200"], 255)
+    assert (outcome, [address for address, _, _ in found], steps) == (SearchOutcome(), ["200"], 255)
     begin = [(1, FIRST), (1, FIRST), *block(2, 32), (1, FIRST), *block(1, 32), *block(33, 64), (1, FIRST)]
     assert bus.asked[: len(begin)] == begin
     assert bus.asked[-34:] == [*block(224, 224), (200, SLOW), *block(225, 254), (255, SLOW), (200, SLOW)]
@@ -99,7 +99,7 @@ def test_a_block_without_a_module_is_asked_again_after_a_second_of_silence():
 
 def test_on_a_silent_line_every_block_is_asked_twice():
     bus = Bus()
-    assert searched(bus) == (Outcome(), [], 255)
+    assert searched(bus) == (SearchOutcome(), [], 255)
     assert len(bus.asked) == 2 * 255 + 1 + 8
     assert bus.asked.count((255, SLOW)) == 2 and bus.asked.count((1, FIRST)) == 2 + 8
 
@@ -107,7 +107,7 @@ def test_on_a_silent_line_every_block_is_asked_twice():
 def test_a_lost_byte_has_the_block_asked_again():
     bus = Bus("1", "20", lost=range(10, 35))  # all from address 10 to the check of the first block
     outcome, found, _ = searched(bus)
-    assert (outcome, [address for address, _, _ in found]) == (Outcome(), ["1", "20"])
+    assert (outcome, [address for address, _, _ in found]) == (SearchOutcome(), ["1", "20"])
     assert bus.asked[31:35] == [(32, 0.05), (1, SLOW), (1, FIRST), (2, 0.05)]
     assert (20, SLOW) in bus.asked
 
@@ -143,7 +143,7 @@ def test_an_address_is_asked_with_the_longest_time_once():
 def test_a_late_reply_belongs_to_the_module_whose_address_it_bears():
     bus = Bus("1", "9", noise={"11": [b"\1" + frame(9, 100, 136, BINARY)]}, lost=(9,))
     outcome, found, _ = searched(bus)
-    assert (outcome, [address for address, _, _ in found]) == (Outcome(), ["1", "9"])
+    assert (outcome, [address for address, _, _ in found]) == (SearchOutcome(), ["1", "9"])
 
 
 def test_a_module_that_replies_to_another_address_is_named_once():

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.families.tmcl.manual import program_file
-from multidrop.families.tmcl.manual.commands import Call
+from multidrop.families.tmcl.manual.commands import TmclCall
 from multidrop.families.tmcl.simulator.program_run import TmclRun
 from tests.support.tmcl_module import Module
 
@@ -78,7 +78,7 @@ def test_all_coordinates_are_copied_at_once() -> None:
 @given(st.integers(-(2**31), 2**31 - 1), st.integers(0, 255), st.integers(0, 255), st.sampled_from([SCO, GCO, CCO]))
 def test_any_numbers_are_answered_and_no_motor_turns(value: int, number: int, motor: int, command: int) -> None:
     module = Module()
-    frame = module.reply(str(Call(command, number, motor, value)))
+    frame = module.reply(str(TmclCall(command, number, motor, value)))
     copies = motor == 255 and command != CCO
     assert (frame.status == 100) is (number <= 20 and (motor == 0 or copies))
     assert module.ask("GAP 3, 0") == 0

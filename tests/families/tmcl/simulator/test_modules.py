@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from multidrop.families.tmcl.host import codec
-from multidrop.families.tmcl.manual.modules import MODULES, Axis, module_of
+from multidrop.families.tmcl.manual.modules import MODULES, AxisParameter, module_of
 from tests.support.foreign_python import TABLES_ONLY, foreign_python
 from tests.support.tmcl_module import Module
 
@@ -79,11 +79,11 @@ def test_every_other_number_is_refused_and_every_range_is_kept(product):
 def test_tmcm_is_the_1241_and_a_version_names_the_module():
     assert module_of("TMCM") is module_of("TMCM-1241") is MODULES["1241"]
     known = {number for number, row in MODULES["1241"].axis.items() if row.known}
-    assert module_of("TMCM-1110").axis.keys() == known - {Axis.UNIT_MODE}
+    assert module_of("TMCM-1110").axis.keys() == known - {AxisParameter.UNIT_MODE}
     for product in MODULES:
         module = Module(product=f"TMCM-{product}")
         assert module.ask("136 1, 0, 0") >> 16 == int(product)
-        assert module.send(codec.frame_of(1, codec.Call(136)))[1:5].decode() == product
+        assert module.send(codec.frame_of(1, codec.TmclCall(136)))[1:5].decode() == product
 
 
 def test_a_module_with_an_old_chip_counts_in_its_units():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic
 from multidrop.families.tmcl.host import codec
-from multidrop.families.tmcl.manual.commands import Call, Command, Global
+from multidrop.families.tmcl.manual.commands import Command, Global, TmclCall
 from multidrop.simulator.cells import read
 from tests.support.tmcl_module import Module
 
@@ -44,19 +44,19 @@ def test_a_negative_value_is_signed():
 
 
 def test_another_address_gets_no_reply():
-    assert Module(address=3).send(codec.frame_of(1, Call(Command.GAP, 1))) == b""
+    assert Module(address=3).send(codec.frame_of(1, TmclCall(Command.GAP, 1))) == b""
 
 
 @pytest.mark.parametrize("address", [0, 1, 9, 255])
 def test_a_module_with_any_address_replies_to_all_with_its_own(address):
     module = Module(address=7, any_address=True)
-    reply = codec.parse_reply(module.send(codec.frame_of(address, Call(Command.GGP, Global.ADDRESS))))
+    reply = codec.parse_reply(module.send(codec.frame_of(address, TmclCall(Command.GGP, Global.ADDRESS))))
     assert reply is not None and (reply.module, reply.status, reply.value) == (7, 100, 7)
 
 
 def test_a_wrong_checksum_is_refused_and_changes_nothing():
     module = Module()
-    frame = codec.frame_of(1, Call(Command.ROR, value=1000))
+    frame = codec.frame_of(1, TmclCall(Command.ROR, value=1000))
     reply = codec.parse_reply(module.send(frame[:-1] + b"\x00"))
     assert reply is not None and (reply.status, reply.command, reply.value) == (1, Command.ROR, 0)
     assert module.ask("GAP 2, 0") == 0
@@ -64,8 +64,8 @@ def test_a_wrong_checksum_is_refused_and_changes_nothing():
 
 def test_a_lost_byte_swallows_the_next_request_and_a_pause_helps():
     module = Module()
-    module.send(codec.frame_of(1, Call(Command.ROR, value=1000))[1:])
-    stop = codec.frame_of(1, Call(Command.MST))
+    module.send(codec.frame_of(1, TmclCall(Command.ROR, value=1000))[1:])
+    stop = codec.frame_of(1, TmclCall(Command.MST))
     swallowed = codec.parse_reply(module.send(stop).ljust(9, b"\0"))
     assert swallowed is None or swallowed.status == 1 or swallowed.command != Command.MST
     module.wait(1.0)
@@ -75,13 +75,13 @@ def test_a_lost_byte_swallows_the_next_request_and_a_pause_helps():
 
 def test_the_pause_before_a_reply_is_kept():
     module = Module(settings={"G75": 20})
-    assert module.send(codec.frame_of(1, Call(Command.GAP, 1))) == b""
+    assert module.send(codec.frame_of(1, TmclCall(Command.GAP, 1))) == b""
     assert len(module.wait(0.03)) == 9
 
 
 def test_the_version_is_text_without_a_checksum_or_a_number():
     module = Module()
-    text = module.send(codec.frame_of(1, Call(Command.VERSION)))
+    text = module.send(codec.frame_of(1, TmclCall(Command.VERSION)))
     assert text[0] == 2 and text[1:].decode("ascii")[4] == "V"
     assert module.ask("136 1, 0, 0") >> 16 == int(text[1:5])
 
@@ -89,20 +89,20 @@ def test_the_version_is_text_without_a_checksum_or_a_number():
 def test_a_new_address_counts_from_the_next_message():
     module = Module()
     assert module.reply("SGP 66, 0, 7").module == 1
-    assert module.send(codec.frame_of(1, Call(Command.GAP, 1))) == b""
+    assert module.send(codec.frame_of(1, TmclCall(Command.GAP, 1))) == b""
     assert module.reply("GGP 66, 0", address=7).value == 7
 
 
 def test_factory_settings_give_no_reply_and_bring_back_address_1():
     module = Module(address=9)
-    assert module.send(codec.frame_of(9, Call(Command.FACTORY, value=1234))) == b""
+    assert module.send(codec.frame_of(9, TmclCall(Command.FACTORY, value=1234))) == b""
     assert module.ask("GGP 66, 0") == 1
 
 
 def test_without_power_it_is_deaf_and_dumb():
     module = Module()
     module.device.power(False, 0.0)
-    assert module.send(codec.frame_of(1, Call(Command.GAP, 1))) == b""
+    assert module.send(codec.frame_of(1, TmclCall(Command.GAP, 1))) == b""
 
 
 @given(st.lists(st.binary(min_size=1, max_size=20), max_size=10))
@@ -112,14 +112,14 @@ def test_any_bytes_leave_a_module_that_replies_after_a_pause(pieces):
         module.send(piece)
     module.wait(1.0)
     address = module.device[Global.ADDRESS]
-    reply = codec.parse_reply(module.send(codec.frame_of(address, Call(Command.GGP, 66))))
+    reply = codec.parse_reply(module.send(codec.frame_of(address, TmclCall(Command.GGP, 66))))
     assert reply is not None and reply.value == address
 
 
 @given(st.integers(0, 255), st.integers(0, 255), st.integers(0, 255), st.integers(-(2**31), 2**31 - 1))
 def test_any_command_gets_one_frame_or_none(command, kind, motor, value):
     module = Module()
-    out = module.send(codec.frame_of(1, Call(command, kind, motor, value)))
+    out = module.send(codec.frame_of(1, TmclCall(command, kind, motor, value)))
     assert len(out) in (0, 9)
     assert out or command == Command.FACTORY
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.families.tmcl.host.codec import frame_of
-from multidrop.families.tmcl.manual.commands import Call
+from multidrop.families.tmcl.manual.commands import TmclCall
 from multidrop.families.tmcl.manual.program_file import compiled, read
 from tests.support.cases import for_each
 from tests.support.examples import examples
@@ -198,8 +198,8 @@ def test_a_download_leaves_what_is_beyond_it() -> None:
 
 def test_a_stored_line_on_the_wire() -> None:
     module = loaded("SAP 4, 0, -2")
-    assert module.send(frame_of(1, Call(134))).hex(" ").upper() == "02 05 04 00 FF FF FF FE 06"
-    assert module.send(frame_of(1, Call(134, value=1))).hex(" ").upper() == "02 00 00 00 00 00 00 00 02"
+    assert module.send(frame_of(1, TmclCall(134))).hex(" ").upper() == "02 05 04 00 FF FF FF FE 06"
+    assert module.send(frame_of(1, TmclCall(134, value=1))).hex(" ").upper() == "02 00 00 00 00 00 00 00 02"
     assert module.refusal("134 0, 0, 2048") == 4
 
 
@@ -240,11 +240,13 @@ def test_a_stop_switch_interrupts_the_program_which_then_goes_on() -> None:
 @examples(60, nightly=1000)
 @given(
     st.lists(
-        st.builds(Call, st.integers(0, 127), st.integers(0, 255), st.sampled_from([0, 2, 3, 7]), st.integers(-3, 300)),
+        st.builds(
+            TmclCall, st.integers(0, 127), st.integers(0, 255), st.sampled_from([0, 2, 3, 7]), st.integers(-3, 300)
+        ),
         max_size=20,
     )
 )
-def test_no_memory_breaks_the_module(memory: list[Call]) -> None:
+def test_no_memory_breaks_the_module(memory: list[TmclCall]) -> None:
     module = Module()
     module.device.program.load(dict(enumerate(memory)))
     module.ask("129 1, 0, 0")

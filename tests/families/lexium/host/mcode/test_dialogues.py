@@ -41,7 +41,7 @@ from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.motions import MCodeMotions
-from multidrop.families.lexium.host.mcode.state import MCodeState, Place, Unconfirmed
+from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace, Unconfirmed
 from multidrop.families.lexium.host.mcode.units import MCodeUnits
 from multidrop.families.lexium.host.mcode.values import MCodeParameters, MCodeValues
 from multidrop.families.lexium.manual import program_file
@@ -51,7 +51,7 @@ USED = (
     lexium_motions, lexium_values, MCodeDebugging,
     replace, Hints, Kind, Owed, Priority, Started, Looking, family, MCodeFamily, before_request, classify, codec,
     debugging, download, exchange, framing, identify, identity, motions, operations, program_readout, programs, quiet,
-    reply_parser, scan, settings, units, values, MCodeMotions, Place, Unconfirmed, MCodeUnits, MCodeParameters,
+    reply_parser, scan, settings, units, values, MCodeMotions, ReplyPlace, Unconfirmed, MCodeUnits, MCodeParameters,
     MCodeValues, Ending, Evidence, Move, MoveKind, Outcome, Held, Stored, Reach, Remembered, ORDINARY, Change,
     Permission, Plan, Readings,
 )  # fmt: skip

@@ -16,13 +16,13 @@ from multidrop.families.lexium.manual import groups, guards, program_checker, pr
 from multidrop.families.lexium.manual.mnemonic import (
     LEXIUM,
     MDRIVE_PLUS,
-    Form,
-    Kept,
+    FormKind,
     Leads,
     Mnemonic,
-    Motion,
-    Position,
-    Prints,
+    MotionEffect,
+    PositionEffect,
+    PrintedValue,
+    Retention,
 )
 from multidrop.families.lexium.manual.table import MDRIVE, MNEMONICS, record, whole_row
 from multidrop.families.lexium.manual.value_forms import FORMS
@@ -84,19 +84,27 @@ def test_a_cell_with_an_unknown_answer_is_refused(column: str) -> None:
 
 @for_each("each", [*MNEMONICS.values(), *MDRIVE.values()])
 def test_the_facts_of_a_word_agree_with_each_other(each: Mnemonic) -> None:
-    assert (each.kept is Kept.NONE) == (not each.valued)
-    assert (each.setup.form is Form.NONE) == (not each.valued)
-    assert (each.restored is not None) == (each.kept in (Kept.SAVED, Kept.UNIT))
+    assert (each.kept is Retention.NONE) == (not each.valued)
+    assert (each.setup.form is FormKind.NONE) == (not each.valued)
+    assert (each.restored is not None) == (each.kept in (Retention.SAVED, Retention.UNIT))
     assert each.restored is None or each.access == "RW"
     assert each.read_back is None or each.restored is not None
-    assert (each.prints is Prints.NOTHING) <= (each.access in ("WO", "-") or each.kind == "instruction")
-    assert (each.setup.form is Form.LIST) <= each.lines
+    assert (each.prints is PrintedValue.NOTHING) <= (each.access in ("WO", "-") or each.kind == "instruction")
+    assert (each.setup.form is FormKind.LIST) <= each.lines
     assert (each.trip != 0) <= (each.leads is Leads.ROUTINE) and (each.place >= 0) == (
         each.leads not in (Leads.ON, Leads.RETURN, Leads.END)
     )
-    moving = (Motion.MOVE, Motion.SLEW, Motion.HOMING, Motion.TEST, Motion.PROGRAM, Motion.RESUME, Motion.RELEASE)
+    moving = (
+        MotionEffect.MOVE,
+        MotionEffect.SLEW,
+        MotionEffect.HOMING,
+        MotionEffect.TEST,
+        MotionEffect.PROGRAM,
+        MotionEffect.RESUME,
+        MotionEffect.RELEASE,
+    )
     assert (each.motion in moving) <= each.starts and (each.turns_at is not None) <= each.starts
-    assert (each.turn > 0) == (each.position is Position.SCALES)
+    assert (each.turn > 0) == (each.position is PositionEffect.SCALES)
     assert each.guard or not each.harmless
 
 
@@ -172,7 +180,7 @@ def test_a_missing_place_is_reported_as_a_label_wherever_a_word_takes_one(line: 
 @for_each("each", groups.ROWS)
 def test_the_form_of_every_value_has_a_class_that_checks_it(each: Mnemonic) -> None:
     assert (each.setup.form in FORMS) == each.valued
-    assert (each.setup.form in (Form.FIELDS, Form.LIST, Form.TRIP)) == bool(each.setup.numbers)
-    if each.setup.form is Form.FIELDS and len(each.setup.numbers) > 1:
+    assert (each.setup.form in (FormKind.FIELDS, FormKind.LIST, FormKind.TRIP)) == bool(each.setup.numbers)
+    if each.setup.form is FormKind.FIELDS and len(each.setup.numbers) > 1:
         assert len(each.setup.numbers) == 1 + each.setup.numbers[0]
-    assert (each.setup.repeated or each.setup.removable) <= (each.setup.form is Form.TRIP)
+    assert (each.setup.repeated or each.setup.removable) <= (each.setup.form is FormKind.TRIP)

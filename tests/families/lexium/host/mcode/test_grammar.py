@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.families.lexium.manual.grammar import (
-    Binary,
+    BinaryTerm,
     Compare,
     LineError,
-    Name,
+    NameTerm,
     Number,
     Statement,
     Text,
-    Unary,
+    UnaryTerm,
     is_name,
     parse,
     strip,
@@ -34,25 +34,25 @@ from tests.support.cases import for_each
         ("MA -51200,1", Statement("MA", (Number(-51200), Number(1)))),
         ("H", Statement("H")),
         ("H20", Statement("H", (Number(20),))),
-        ("CL Kb,I1=1", Statement("CL", (Name("KB"), Compare("=", Name("I1"), Number(1))))),
-        ("CL K0,R1 = 0", Statement("CL", (Name("K0"), Compare("=", Name("R1"), Number(0))))),
-        ("CL Q5, I5=<2048", Statement("CL", (Name("Q5"), Compare("<=", Name("I5"), Number(2048))))),
-        ("BR M0, V >=0", Statement("BR", (Name("M0"), Compare(">=", Name("V"), Number(0))))),
-        ("BR L5, IN=07", Statement("BR", (Name("L5"), Compare("=", Name("IN"), Number(7))))),
-        ("R1=R1 & 7", Statement("R1", (Binary("&", Name("R1"), Number(7)),), equals=True)),
-        ("MR R1*51200", Statement("MR", (Binary("*", Name("R1"), Number(51200)),))),
-        ("R3=!R1", Statement("R3", (Unary("!", Name("R1")),), equals=True)),
-        ("F2=CS R3", Statement("F2", (Unary("CS", Name("R3")),), equals=True)),
-        ("F1=L_ F2", Statement("F1", (Unary("L_", Name("F2")),), equals=True)),
-        ("VA C0 = 51200", Statement("VA", (Compare("=", Name("C0"), Number(51200)),))),
-        ("VAQ1=25", Statement("VA", (Compare("=", Name("Q1"), Number(25)),))),
-        ("Tp=51200,Kb", Statement("TP", (Number(51200), Name("KB")), equals=True)),
+        ("CL Kb,I1=1", Statement("CL", (NameTerm("KB"), Compare("=", NameTerm("I1"), Number(1))))),
+        ("CL K0,R1 = 0", Statement("CL", (NameTerm("K0"), Compare("=", NameTerm("R1"), Number(0))))),
+        ("CL Q5, I5=<2048", Statement("CL", (NameTerm("Q5"), Compare("<=", NameTerm("I5"), Number(2048))))),
+        ("BR M0, V >=0", Statement("BR", (NameTerm("M0"), Compare(">=", NameTerm("V"), Number(0))))),
+        ("BR L5, IN=07", Statement("BR", (NameTerm("L5"), Compare("=", NameTerm("IN"), Number(7))))),
+        ("R1=R1 & 7", Statement("R1", (BinaryTerm("&", NameTerm("R1"), Number(7)),), equals=True)),
+        ("MR R1*51200", Statement("MR", (BinaryTerm("*", NameTerm("R1"), Number(51200)),))),
+        ("R3=!R1", Statement("R3", (UnaryTerm("!", NameTerm("R1")),), equals=True)),
+        ("F2=CS R3", Statement("F2", (UnaryTerm("CS", NameTerm("R3")),), equals=True)),
+        ("F1=L_ F2", Statement("F1", (UnaryTerm("L_", NameTerm("F2")),), equals=True)),
+        ("VA C0 = 51200", Statement("VA", (Compare("=", NameTerm("C0"), Number(51200)),))),
+        ("VAQ1=25", Statement("VA", (Compare("=", NameTerm("Q1"), Number(25)),))),
+        ("Tp=51200,Kb", Statement("TP", (Number(51200), NameTerm("KB")), equals=True)),
         ("Is =1,0,0", Statement("IS", (Number(1), Number(0), Number(0)), equals=True)),
         ('DN="a"', Statement("DN", (Text("a"),), equals=True)),
-        ("EX G1, 2", Statement("EX", (Name("G1"), Number(2)))),
+        ("EX G1, 2", Statement("EX", (NameTerm("G1"), Number(2)))),
         ("MA 5,,1", Statement("MA", (Number(5), None, Number(1)))),
         ("-100", Statement("", (Number(-100),))),
-        ("BR G1 `back, `again", Statement("BR", (Name("G1"),))),
+        ("BR G1 `back, `again", Statement("BR", (NameTerm("G1"),))),
     ],
 )
 def test_a_statement_is_taken_apart(line, statement):
@@ -62,12 +62,12 @@ def test_a_statement_is_taken_apart(line, statement):
 @pytest.mark.parametrize(
     ("line", "arguments", "quiet"),
     [
-        ('PR "V3="V3', (Text("V3="), Name("V3")), False),
-        ('PR "a", P, "b"', (Text("a"), Name("P"), Text("b")), False),
-        ("PR MV ST I1", (Name("MV"), Name("ST"), Name("I1")), False),
-        ('PR "it\'s",P;', (Text("it's"), Name("P")), True),
+        ('PR "V3="V3', (Text("V3="), NameTerm("V3")), False),
+        ('PR "a", P, "b"', (Text("a"), NameTerm("P"), Text("b")), False),
+        ("PR MV ST I1", (NameTerm("MV"), NameTerm("ST"), NameTerm("I1")), False),
+        ('PR "it\'s",P;', (Text("it's"), NameTerm("P")), True),
         ("PR", (), False),
-        ("PRP", (Name("P"),), False),
+        ("PRP", (NameTerm("P"),), False),
     ],
 )
 def test_prints_take_their_items_with_and_without_commas(line, arguments, quiet):
@@ -75,8 +75,8 @@ def test_prints_take_their_items_with_and_without_commas(line, arguments, quiet)
 
 
 def test_operators_are_carried_out_from_left_to_right():
-    inner = Binary("+", Name("Q1"), Name("Q2"))
-    assert parse("R1=Q1+Q2*Q3") == Statement("R1", (Binary("*", inner, Name("Q3")),), equals=True)
+    inner = BinaryTerm("+", NameTerm("Q1"), NameTerm("Q2"))
+    assert parse("R1=Q1+Q2*Q3") == Statement("R1", (BinaryTerm("*", inner, NameTerm("Q3")),), equals=True)
 
 
 @pytest.mark.parametrize("line", ["", "   ", "' remark", "`PG 1", "\t"])

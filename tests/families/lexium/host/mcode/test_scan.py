@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.codec import copy_with
-from multidrop.dialects.scanning import Outcome, Reach
+from multidrop.dialects.scanning import Reach, SearchOutcome
 from multidrop.families.lexium.host.mcode import scan
 from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.examples import examples
@@ -184,6 +184,6 @@ def test_a_search_ends_whatever_is_received(random, hasty):
         try:
             request = conversation.send(copy_with(found.reply, raw=data[: found.used]))
         except StopIteration as end:
-            assert isinstance(end.value, Outcome)
+            assert isinstance(end.value, SearchOutcome)
             return
     raise AssertionError("it does not end")
