@@ -274,9 +274,12 @@ class AsyncDrive(DriveFacts):
         """Begin to home in a direction, `-` or `+`; `wait` waits for its end.
 
         `mode`: what it looks for, as the family has it: `home` (the switch), `index`. Raises Diagnostic with the
-        choices; a direction is left out where the drive's own settings fix it.
+        choices; a direction is left out where the drive's own settings fix it. Raises Inexpressible where no line homes
+        such drives.
         """
         modes = self._drive.family.values.actions.homings(_first(self))
+        if not modes:
+            raise Inexpressible(f"{self.name}: no line of such drives homes them; nothing was sent")
         lines = modes.get(mode or next(iter(modes)))
         if lines is None:
             raise Diagnostic(f"no mode {mode}", f"home() of {self.name}", f"valid: {', '.join(modes)}")

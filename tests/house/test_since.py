@@ -13,6 +13,8 @@ WIRE = "tests/drives/test_inbox.py"
 SCREEN = "tests/tui/test_app.py"
 USB = "tests/features/usb/"
 PMX = "tests/families/pmx/"
+HOST = "tests/families/pmx/host/"
+SUITE = "tests/families/pmx/test_contract.py"
 DOOR = "tests/multidrop/test_failures.py"
 RECORDS = "tests/features/test_records.py"
 TEXTS = "tests/docs/test_links.py"
@@ -21,13 +23,14 @@ TEXTS = "tests/docs/test_links.py"
 @pytest.mark.parametrize(
     ("change", "runs", "leaves"),
     [
-        ("features/usb/schemes.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, PMX, DOOR)),
-        ("features/usb/anything.csv", (USB, RECORDS, TEXTS), (WIRE, SCREEN, PMX, DOOR)),
-        ("features/usb/not_there.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, PMX, DOOR)),
+        ("features/usb/schemes.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, HOST, DOOR)),
+        ("features/usb/anything.csv", (USB, RECORDS, TEXTS), (WIRE, SCREEN, HOST, DOOR)),
+        ("features/usb/not_there.py", (USB, RECORDS, TEXTS), (WIRE, SCREEN, HOST, DOOR)),
         ("families/pmx/manual/commands.csv", (PMX, TEXTS), (WIRE, SCREEN, DOOR)),
-        ("tui/app.py", (SCREEN, DOOR, TEXTS), (WIRE, PMX)),
+        ("tui/app.py", (SCREEN, DOOR, SUITE, TEXTS), (WIRE, HOST)),
         ("drives/inbox.py", (WIRE, SCREEN, DOOR, TEXTS), ("tests/transports/test_pipes.py", "tests/macros/")),
-        ("shell/verbs/units.py", ("tests/shell/test_units.py", SCREEN, DOOR, TEXTS), (WIRE, PMX)),
+        ("shell/verbs/units.py", ("tests/shell/test_units.py", SCREEN, DOOR, SUITE, TEXTS), (WIRE, HOST)),
+        ("multidrop/contract/motion.py", (SUITE, TEXTS), (WIRE, SCREEN, HOST)),
         ("tests/support/pmx_controller.py", (PMX, TEXTS), (SCREEN, DOOR)),
         (WIRE, (WIRE, TEXTS), (SCREEN, USB, DOOR)),
         ("docs/safety.md", (TEXTS,), (WIRE, SCREEN, USB, DOOR)),

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import multidrop
 from multidrop import AsyncSession, MotionFailed, connect_async
 from tests.support.cell_session import bus, drive
 
@@ -23,17 +22,6 @@ async def session(tmp_path: Path) -> AsyncIterator[AsyncSession]:
     (tmp_path / "cell.toml").write_text(CELL)
     async with connect_async(f"sim:{tmp_path / 'cell.toml'}") as opened:
         yield opened
-
-
-async def test_a_wait_raises_with_what_is_known(session: AsyncSession) -> None:
-    axis = session.drive("a")
-    await axis.move_to(90000)
-    with pytest.raises(MotionFailed) as caught:
-        await axis.wait()
-    failure = caught.value
-    assert (failure.reason, failure.target, failure.outcome) == ("error 83: plus limit reached", 90000, "limit")
-    assert failure.position == await axis.position() > 30000
-    assert isinstance(failure, multidrop.DriveError)
 
 
 async def test_a_wait_for_a_value_raises_early(session: AsyncSession) -> None:

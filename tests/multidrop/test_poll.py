@@ -22,11 +22,6 @@ personality = "LMDCM"
 name = "b"
 party = true
 set = { VM = 5000 }
-[[bus]]
-name = "pmx"
-[[bus.drive]]
-personality = "PMX"
-name = "00"
 """
 
 
@@ -54,11 +49,6 @@ def test_json_is_one_object_a_value(polled):
     (found,) = map(json.loads, done.stdout.splitlines())
     assert re.fullmatch(STAMP, found.pop("time"))
     assert found == {"bus": "line", "drive": "a", "name": "VM", "value": 6000}
-
-
-def test_other_families_give_their_own_words(polled):
-    done = polled("pmx", "PX", "V1", "--every", "1", "--rows", "1")
-    assert (done.returncode, done.stdout.split()[:3]) == (0, ["time", "00.PX", "00.V1"])
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,9 @@ import pytest
 
 from multidrop.shell.session import Session
 from tests.shell.test_outcomes import noted, ran, value
-from tests.shell.test_outcomes_pmx_tmcl import value as asked
 from tests.shell.test_outcomes_without_target import SLOW, typed
 from tests.support.cell_session import bus, drive, party, pmx, session_on
-from tests.support.outcomes import failed, sent
+from tests.support.outcomes import asked, failed, sent
 
 pytestmark = pytest.mark.virtual
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.shell.test_outcomes import on, ran, value
-from tests.shell.test_outcomes_pmx_tmcl import controller
-from tests.shell.test_outcomes_pmx_tmcl import value as asked
 from tests.shell.test_outcomes_without_target import SLOW, other, typed
-from tests.support.outcomes import failed, sent
+from tests.support.outcomes import asked, controller, failed, sent
 
 pytestmark = pytest.mark.virtual
 

@@ -13,10 +13,8 @@ from multidrop.families.tmcl.host.codec import Tmcl, TmclState
 from multidrop.families.tmcl.host.motions import TmclMotions
 from multidrop.shell.session import Session
 from tests.shell.test_outcomes import at_limit, noted, on, ran, value
-from tests.shell.test_outcomes_pmx_tmcl import SWITCHES, controller, module
-from tests.shell.test_outcomes_pmx_tmcl import value as asked
 from tests.support.cell_session import bus, drive, session_on
-from tests.support.outcomes import failed, sent
+from tests.support.outcomes import SWITCHES, asked, controller, failed, module, sent
 
 pytestmark = pytest.mark.virtual
 

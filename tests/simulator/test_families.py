@@ -15,13 +15,12 @@ from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cells import CellReader
 from multidrop.simulator.declared import simulated
-from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, family_of
+from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, family_of
 from multidrop.simulator.family import Place, SimulatedFamily, Unit
 from multidrop.simulator.wire import Transmission, Wire
 from multidrop.simulator.world import World
 
 FRAME = Struct(">BBBBiB")
-BYTE = 10 / 9600
 
 
 class Frames:
@@ -163,26 +162,6 @@ def test_a_flood_of_frames_waits_at_the_end_of_a_frame_and_loses_nothing() -> No
     for n in range(100):
         heard += wire.advance(float(n))
     assert port.received == asked and len(heard) == 9 * len(asked)
-
-
-def test_every_family_reads_and_builds_its_drives() -> None:
-    for personality in BY_PERSONALITY:
-        family = family_of(personality)
-        spec = family.read_drive(Table({"personality": personality}, "cell"), Path("."))
-        unit = family.build(spec, Place())
-        assert unit.device.powered and unit.port.sent(0.0) == []
-        assert (unit.connect is not None) == (personality in family.ethernet)
-        assert len(unit.worlds) == len(spec.further) + 1
-
-
-def test_every_default_drive_of_a_program_test_is_of_its_family() -> None:
-    for name, programs in PROGRAMS.items():
-        assert programs.drive.personality in simulated()[name].personalities
-
-
-def test_a_check_knows_the_products_of_just_the_families_in_which_a_drive_refuses_more() -> None:
-    for name, programs in PROGRAMS.items():
-        assert programs.by_product == ("refusals" in vars(programs)), name
 
 
 def test_each_row_has_the_name_and_the_products_of_its_family() -> None:

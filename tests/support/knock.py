@@ -63,13 +63,13 @@ class KnockFamily(Family):
 
     @classmethod
     def identify(cls, hints: Hints) -> Procedure[list[DriveState]]:
-        found = []
-        for address in hints.drives or ("A",):
-            state = cls.new_state(cls.codec, address)
-            state.identified("Knock", "1.0")
-            if (yield cls.codec.request(address, "?")).end is End.DONE:
-                found.append(state)
-        if not found:
+        found = [cls.new_state(cls.codec, address) for address in hints.drives or ("A",)]
+        for state in found:
+            if (yield cls.codec.request(state.address, "?")).end is End.DONE:
+                state.identified("Knock", "1.0")
+            else:
+                state.note(f"{who(state)} does not reply")
+        if not any(state.product for state in found):
             raise NoAnswer("no drive replies")
         return found
 

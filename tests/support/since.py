@@ -114,8 +114,7 @@ def _part(change: str, test: str) -> bool:
     folder = OF_PARTS.get(room)
     if folder is None or not test.startswith(f"{folder}/"):
         return False
-    own = f"{folder}/{inner[0]}/"
-    return test.startswith((own, f"{folder}/contract/")) or PurePosixPath(test).parent == PurePosixPath(folder)
+    return test.startswith(f"{folder}/{inner[0]}/") or PurePosixPath(test).parent == PurePosixPath(folder)
 
 
 def _modules(name: str, graph: grimp.ImportGraph) -> set[str]:

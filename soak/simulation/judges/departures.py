@@ -234,7 +234,7 @@ def stop_bytes(life: Lived, line: str, stop: Stop, until: float) -> bytes:
         return whole[len(before) :]
 
 
-TYPED = re.compile(r"(?!Ctrl\+X)\S+: stop sent to every drive")
+TYPED = re.compile(r"(?!Ctrl\+X)\S+: stop (?:not )?sent to every drive")
 """What is said of a stop that came by no key, such as `/stop`."""
 STILL = 2.0
 """The time, s, in which a stop may still be on its way, although the loop has written nothing since."""

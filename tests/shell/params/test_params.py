@@ -33,20 +33,6 @@ party = true
 set = { EM = 1, CK = 1, VM = 512000 }
 program_text = "PG 1\\nLB G1\\nH 1000\\nBR G1\\nE\\nPG\\n"
 """
-OTHERS = """
-[[bus]]
-name = "pmx"
-[[bus.drive]]
-personality = "PMX"
-[[bus]]
-name = "slide"
-[[bus.drive]]
-personality = "TMCM"
-[[bus]]
-name = "old"
-[[bus.drive]]
-personality = "MDIX"
-"""
 
 
 async def opened(tmp_path, text):
@@ -302,29 +288,6 @@ async def test_a_value_that_is_not_what_was_sent_is_a_failure_and_is_not_saved(s
     assert "RC=33" in executed and "S" not in executed
     one.reset(one.now)
     assert one.memory.values["RC"] == before
-
-
-@pytest.mark.slow
-async def test_every_family_goes_into_a_file_and_back(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    session = await opened(tmp_path, OTHERS)
-    try:
-        await say(session, "/params backup kept all")
-        assert sorted(path.name for path in (tmp_path / "kept").iterdir()) == [
-            "old.toml",
-            "pmx-00.toml",
-            "slide-1.toml",
-        ]
-        changes = ("@pmx:00 HSPD=9000", "@pmx:00 LSPD=8000", "@pmx:00 V40=6", "@slide:1 SAP 5, 0, 77", "@old: S1=17,1")
-        await say(session, *changes)
-        assert len(await say(session, "/params diff kept all")) == 5
-        await say(session, "/params restore kept all --save")
-        assert await say(session, "/params diff kept all") == []
-        for line in ("/params diff kept/pmx-00.toml slide:1", "/params diff --against pmx:00 slide:1"):
-            with pytest.raises(Diagnostic, match="PMX.*and slide:1 has TMCL; their settings cannot be compared"):
-                await say(session, line)
-    finally:
-        await session.close()
 
 
 @pytest.mark.parametrize(

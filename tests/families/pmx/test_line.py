@@ -245,19 +245,6 @@ async def test_to_all_is_told_to_each_in_turn_and_one_failure_keeps_it_from_none
     await bus.close()
 
 
-async def test_samples_come_for_both_axes():
-    bus, wire = await opened("00", PX="7", PY="-8", MSTY="4", PSY="300", MSTX="256")
-    samples = []
-    bus.watch(lambda event: samples.append(event) if hasattr(event, "velocity") else None)
-    bus.telemetry.subscribe(["00"], 0.05)
-    await asyncio.sleep(1)
-    x, y = samples[:2]
-    assert (x.axis, x.position, x.velocity, x.trouble) == ("x", 7, 0, "minus limit error")
-    assert (y.axis, y.position, y.velocity, y.trouble) == ("y", -8, 300, "")
-    assert 8 < bus.telemetry.rate("00") < 20
-    await bus.close()
-
-
 def test_the_gap_is_only_between_pieces_of_a_stop():
     line = Line(Pmx(), timeout=1.0)
     line.stop(0.0, StopPiece(b"one\r", 0.03), StopPiece(b"two\r", 0.03))

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from multidrop.base.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
-from multidrop.drives.events import Sample, Traffic, Unsolicited
+from multidrop.drives.events import Traffic, Unsolicited
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
@@ -142,16 +142,6 @@ async def test_the_same_line_has_the_same_answer(session):
     assert differing == []
 
 
-@pytest.mark.slow
-async def test_a_move_over_one_is_seen_over_the_other(session):
-    await session.run("/use modbus")
-    await session.run("MR 51200")
-    await session.run("/wait stopped 10")
-    await session.run("MR -1200")
-    await session.run("/wait idle 10")
-    assert [await answers(session, "PR P,MV", bus) for bus in ("mcode", "modbus")] == [["500000"], ["500000"]]
-
-
 async def test_a_program_is_run_paused_and_ended(session):
     await session.run("@modbus: EX A3")
     assert await answers(session, "PR BY", "mcode") == ["1"]
@@ -179,21 +169,6 @@ async def test_pr_al_prints_what_it_prints_over_mcode_as_far_as_there_are_regist
 
 
 BOTH = ("mcode", "modbus")
-
-
-async def test_programs_are_read_and_written_over_mcode(session, tmp_path):
-    await session.run("/use modbus")
-    with pytest.raises(Inexpressible, match="MCode/TCP"):
-        await session.run("/list")
-    with pytest.raises(Inexpressible, match="MCode/TCP"):
-        await session.run(f"/download {tmp_path}/p.mxt")
-
-
-async def test_a_refusal_names_the_exception_and_the_register(session):
-    with pytest.raises(
-        Refused, match=r"exception 03 illegal data value at register 0x0029 \(HC\), which takes 0 to 100"
-    ):
-        await session.run("@modbus: HC=101")
 
 
 async def test_raw_registers_outputs_and_identification(session):
@@ -240,13 +215,6 @@ async def test_wrong_usage(session, line, named):
         await session.run(line)
 
 
-@pytest.mark.parametrize("line", ["/register 0x57", "/coil 1", "/device"])
-async def test_on_another_language_the_verbs_say_where_they_belong(session, line):
-    await session.run("/use mcode")
-    with pytest.raises(DriveError, match=rf"{line.split()[0]} is valid on a bus opened with modbus://HOST"):
-        await session.run(line)
-
-
 @pytest.mark.slow
 async def test_a_stop_ends_program_and_motion_and_is_seen_to_work(session):
     await session.run("@modbus: EX A3")
@@ -265,28 +233,6 @@ async def test_a_stop_ends_program_and_motion_and_is_seen_to_work(session):
     assert [e.text for e in session.events if isinstance(e, Notified) and "stopped, velocity 0" in e.text]
     assert not [e for e in session.events if isinstance(e, OnBus) and isinstance(e.event, Unsolicited)]
     assert await answers(session, "PR V,BY", "modbus") == ["00"]
-
-
-@pytest.mark.slow
-async def test_telemetry_samples_position_and_velocity(session):
-    await session.run("@modbus: SL 100000")
-    samples = []
-    bus = session.buses["modbus"]
-    enough = asyncio.Event()
-
-    def keep(event):
-        if isinstance(event, Sample):
-            samples.append(event)
-            if len(samples) > 20:
-                enough.set()
-
-    bus.watch(keep)
-    looking = bus.telemetry.subscribe([""])
-    async with asyncio.timeout(PATIENCE):
-        await enough.wait()
-    looking.close()
-    assert samples[-1].velocity == 100000
-    assert [s.position for s in samples] == sorted(s.position for s in samples)
 
 
 async def test_the_state_in_words_is_the_same_over_both(session):

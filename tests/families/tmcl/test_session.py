@@ -1,21 +1,18 @@
-"""TMCL modules in a session: typed lines, the stop of a whole line, telemetry, a line of two families, no guessing."""
+"""TMCL modules in a session: new addresses, download mode and the stop, the reply to a poll that was cut off."""
 
 from __future__ import annotations
 
 import asyncio
 import itertools
-from dataclasses import replace
 
 import pytest
 
-from multidrop.base.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from multidrop.dialects.families import dialects
-from multidrop.drives.events import Sample, Unsolicited
+from multidrop.base.errors import DriveError, NoAnswer
+from multidrop.drives.events import Unsolicited
 from multidrop.drives.stop_forms import stop_forms
 from multidrop.families.tmcl.manual import instructions
-from multidrop.shell.connect.urls import parse as parse_url
-from multidrop.shell.events import By, Notified, OnBus, Output, Printed
-from multidrop.shell.prompt.complete import complete, hint
+from multidrop.shell.events import Notified, OnBus, Output, Printed
+from multidrop.shell.prompt.complete import hint
 from tests.support.cell_session import bus, drive, session_on
 from tests.support.until import PATIENCE
 
@@ -39,77 +36,12 @@ async def say(session, *lines):
     return [event.text for event in session.events if isinstance(event, Printed | Output)]
 
 
-async def test_the_modules_of_a_cell_are_found_with_their_product(session):
-    modules = session.buses["slide"].drives
-    assert [(name, drive.state.product) for name, drive in modules.items()] == [("1", "TMCM-1241"), ("7", "TMCM-1241")]
-    assert await say(session, "@slide:7 GGP 66, 0", "@1 GGP 66, 0") == ["7", "1"]
-
-
-async def test_a_command_prints_nothing_and_a_value_is_printed(session):
-    lines = ("@1 SAP 4, 0, 200000", "SAP 5, 0, 1000000", "MVP ABS, 0, 3000", "/wait stopped", "GAP 1, 0")
-    assert (await say(session, *lines))[-1] == "3000"
-
-
-async def test_wrong_lines_change_nothing(session):
-    with pytest.raises(Inexpressible, match="MVP takes 3 fields"):
-        await say(session, "@1 MVP 0, 1")
-    with pytest.raises(Refused, match="status 3, wrong type"):
-        await say(session, "@1 ROR 3, 100")
-    assert await say(session, "@1 GAP 3, 0") == ["0"]
-
-
-async def test_a_stop_stops_every_module_and_the_other_family_too(session):
-    await say(session, "@1 ROR 0, 20000", "@7 ROL 0, 20000", "@press: SL 10000")
-    session.events.clear()
-    session.stop()
-    async with asyncio.timeout(PATIENCE):
-        await session.buses["slide"].stopped()
-        await session.buses["press"].stopped()
-    told = [event.text for event in session.events if isinstance(event, Notified)]
-    assert sum("stopped, velocity 0" in text for text in told) == 3, told
-    assert not [text for text in told if "not known" in text or "STILL" in text]
-    assert await say(session, "@1 GAP 3, 0", "@7 GAP 3, 0", "@press: PR V") == ["0", "0", "0"]
-    with pytest.raises(Stopped):
-        await session.run("@1 ROR 0, 5", replace(session.origin, by=By.MACRO))
-
-
-async def test_what_is_typed_after_a_stop_is_sent(session):
-    session.stop()
-    assert await say(session, "@1 SAP 4, 0, 7", "GAP 4, 0") == ["7"]
-
-
-async def test_position_and_velocity_are_polled(session):
-    await say(session, "@1 ROR 0, 5000")
-    bus = session.buses["slide"]
-    session.events.clear()
-    subscription = bus.telemetry.subscribe(["1", "7"])
-    samples = []
-    async with asyncio.timeout(PATIENCE):
-        while len(samples) < 20:
-            await asyncio.sleep(0.02)
-            found = [event.event for event in session.events if isinstance(event, OnBus)]
-            samples = [each for each in found if isinstance(each, Sample)]
-    subscription.close()
-    first = [each for each in samples if each.address == "1"]
-    assert first[-1].velocity == 5000
-    assert all(one.position < two.position for one, two in itertools.pairwise(first))
-    assert {each.position for each in samples if each.address == "7"} == {0}
-
-
 async def test_help_and_completion_are_those_of_the_module(session):
     await say(session, "@1 MST 0")
-    assert (await say(session, "/help ROL"))[0].startswith("ROL: Rotate left")
     assert (await say(session, "/help 4"))[0].startswith("status 4: invalid value")
     for word, row in instructions.WORDS.items():
         assert (await say(session, f"/help {word}"))[0] == f"{word}: {row.title}"
-    assert "MVP" in [each.text for each in complete(session, "MV")]
     assert "maximum positioning velocity" in hint(session, "SAP 4")
-
-
-def test_nothing_leads_to_it_but_its_name():
-    assert dialects()["tmcl"].scheme == ""
-    assert parse_url("tcp://127.0.0.1:4001").hints.family != "tmcl"
-    assert parse_url("tcp://127.0.0.1:4001?dialect=tmcl&drives=1,7").hints.drives == ("1", "7")
 
 
 async def test_a_module_that_does_not_answer_delays_no_other_modules_stop(session):
@@ -132,9 +64,6 @@ async def test_a_user_variable_with_the_number_of_the_address_changes_no_address
     assert session.buses["slide"].drives["1"].address == "1"
 
 
-SHUTTLE = ("132 0, 0, 0", "MVP ABS, 0, 20000", "27 1, 0, 0", "MVP ABS, 0, 0", "27 1, 0, 0", "22 0, 0, 0", "133 0, 0, 0")
-
-
 def module(session):
     placed = [each for floor in session.cells.values() for each in floor.floor.drives]
     return next(each.device for each in placed if (each.bus, each.spec.name) == ("slide", "1"))
@@ -145,19 +74,6 @@ async def confirmed(session):
         await session.buses["slide"].stopped()
     await asyncio.sleep(3.0)
     return [event.text for event in session.events if isinstance(event, Notified)]
-
-
-async def test_a_stop_ends_the_program_of_a_module_before_its_motor(session):
-    await say(session, *(f"@slide:1 {line}" for line in SHUTTLE), "@slide:1 129 1, 0, 0")
-    await asyncio.sleep(1.0)
-    assert module(session).program.running and await say(session, "@slide:1 135 0, 0, 0") == ["1"]
-    session.stop("Ctrl+X")
-    told = await confirmed(session)
-    assert not module(session).program.running and any("1: stopped, velocity 0" in text for text in told)
-    now, motor = next(iter(session.cells.values())).now, module(session).motors[0]
-    place = motor.read(1, now())
-    await asyncio.sleep(5.0)
-    assert motor.read(1, now()) == place
 
 
 async def test_a_stop_reaches_a_module_that_is_in_download_mode_and_moves(session):

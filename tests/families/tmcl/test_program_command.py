@@ -78,28 +78,6 @@ def test_a_refused_line_fails_the_test_and_names_its_line(multidrop: Command) ->
     ]
 
 
-def test_download_upload_and_list_of_one_session(multidrop: Command, folder: Path) -> None:
-    (folder / "go.mdr").write_text(
-        "/download shuttle.tmc 1 --run Loop\n/sleep 0.2\n135 0, 0, 0\n/download shuttle.tmc 1 --only-changed\n"
-        "/list 1\n/upload back.tmc 1\n"
-    )
-    done = multidrop("run", "go.mdr", "--on", "sim:cell.toml")
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines() == [
-        "1",
-        "   // there and back",
-        "   Far = 20000",
-        "0  Loop: MVP ABS, 0, Far   // far end",
-        "1      WAIT POS, 0, 0",
-        "2      MVP ABS, 0, 0",
-        "3      WAIT POS, 0, 0",
-        "4      JA Loop",
-    ]
-    assert "verified, 5 lines" in done.stderr and "started (129 1, 0, 0)" in done.stderr
-    assert "holds shuttle.tmc already; nothing was sent" in done.stderr
-    assert (folder / "back.tmc").read_text() == FILE
-
-
 def test_a_module_of_a_cell_holds_a_program_and_a_raw_upload_gives_its_lines(multidrop: Command, folder: Path) -> None:
     (folder / "cell.toml").write_text(CELL.replace('name = "1"', 'name = "1"\nprogram = "shuttle.tmc"'))
     done = multidrop("program", "upload", "sim:cell.toml", "-", "--raw")
