@@ -107,8 +107,10 @@ def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Drive
     if not drives:
         yield DriveFate(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)
     for drive in drives:
-        name = (drive.label or drive.address) + halt.part_of(drive)
-        yield DriveFate(halt.fate(drive), f"{bus}:{name}" if several and name else name or bus, bus, why)
+        name, part = drive.label or drive.address, halt.part_of(drive)
+        yield DriveFate(
+            halt.fate(drive), f"{bus}:{name}{part}" if several and name else f"{name or bus}{part}", bus, why
+        )
 
 
 def names(tally: FateTally, fate: Fate) -> str:

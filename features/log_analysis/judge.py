@@ -251,13 +251,19 @@ class _Session:
             if match[2] or target in self._lines:
                 self._unsent.add(target)
         if entry.kind == "notice" and self._stop is not None and STOPPED.match(entry.text):
-            drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")
+            drive = _stopped_drive(entry)
             moment = entry.time - self._stop < MOMENT
             if moment and self._stops == 1 and not self._begun:
                 return  # of a stop before this log
             earlier = self._earlier[entry.bus, drive] * moment
             if (replies := max(self._replies[entry.bus, drive], earlier)) < READINGS:
                 yield "stopped", f"{entry.text!r}, after {replies} replies"
+
+
+def _stopped_drive(entry: LogEntry) -> str:
+    """The address in a report of a stop: `press: 01 X: stopped, ...`; without an address, `press X: stopped, ...`."""
+    name = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ").partition(" ")[0]
+    return "" if name == entry.bus else name
 
 
 def _silence(typed: Typed) -> tuple[str, str]:

@@ -65,6 +65,15 @@ async def test_a_stop_of_one_axis_claims_nothing_of_another_that_moves_on(cell, 
         assert stopped.startswith(f"line: {said}: ") and "," not in stopped.partition("velocity")[2]
 
 
+async def test_the_stop_of_an_axis_of_a_controller_without_an_address_is_named_by_its_line(tmp_path):
+    async with CellSession(tmp_path, bus("line", pmx("00")), usb=True) as shop:
+        with pytest.raises(Refused):
+            await sent(shop.session, "JX+", "/sleep 1", "STATUS")
+        await asyncio.sleep(1)
+        assert shop.moving() == set()
+        assert shop.warned()[-1] == "stopped line X: velocity 0 was read from line X"
+
+
 async def test_a_drive_at_rest_with_trips_that_a_person_has_enabled_is_stopped(tmp_path):
     """A trip can move it again, whoever enabled that."""
     async with CellSession(tmp_path, press()) as shop:

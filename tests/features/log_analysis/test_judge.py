@@ -334,3 +334,13 @@ def test_a_clock_that_was_set_back_keeps_the_stop_before_what_came_after_it(firs
     )
     path.write_bytes(b"".join(map(line_of, entries)))
     assert [each.rule for each in judged(files.whole(path)).breaches] == {"stop": [], "command": ["first"]}[first]
+
+
+@pytest.mark.parametrize(
+    ("drive", "report"), [("a", "l: a X"), ("a", "l: a motor 0"), ("", "l"), ("", "l X"), ("", "l motor 0")]
+)
+def test_the_report_of_the_stop_of_one_axis_is_of_its_drive(drive: str, report: str, tmp_path: Path) -> None:
+    rows = [*HEAD, STOP, ESC, *asked("BY,P", "0512", drive) * 2, said(f"{report}: stopped, velocity 0 at 512")]
+    assert found(rows, tmp_path, apart=0.01) == []
+    del rows[4:6]
+    assert [rule for rule, _ in found(rows, tmp_path, apart=0.01)] == ["stopped"]
