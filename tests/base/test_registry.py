@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.metadata
 import os
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +14,7 @@ import pytest
 from multidrop.base import places, registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
+from tests.support.own_features import forget_loaded, load, wheel_unread
 
 GOOD = 'from multidrop.base.feature import Feature\nFEATURE = Feature("{name}", "does something")\n'
 NO_OPENING = """
@@ -33,9 +33,7 @@ def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The folder of a person's own features; nothing is loaded before or after."""
     monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
     monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
-    monkeypatch.setattr(registry, "_others", {})
-    monkeypatch.setattr(registry, "_failed", {})
-    monkeypatch.setattr(registry, "_untold", [])
+    forget_loaded(monkeypatch)
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [])
     folder = tmp_path / "features"
     folder.mkdir()
@@ -215,7 +213,7 @@ def test_a_feature_of_the_wheel_whose_module_raises_is_one_warning_and_its_word_
 
     monkeypatch.setattr(registry, "IN_WHEEL", {"twins": ("/twin",)})
     monkeypatch.setattr(registry, "FAMILIES", {})
-    monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
+    wheel_unread(monkeypatch)
     monkeypatch.setattr(registry.importlib, "import_module", raising)
     assert list(registry.wheels()) == [] == list(registry.wheels())
     assert registry.warnings() == [f"the feature twins (multidrop) cannot be loaded: {why}"]
@@ -246,5 +244,5 @@ def test_of_two_features_for_a_single_place_the_later_one_is_refused(own: Path) 
 
 def test_what_features_add_is_found_by_its_class(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "IN_WHEEL", {})
-    registry._others["p"] = registry.FeatureEntry("x", "dist", "1", "p"), Feature("x", "y", adds=(1, "a", 2.5, 3))
+    load(monkeypatch, Feature("x", "y", adds=(1, "a", 2.5, 3)))
     assert list(registry.added(int)) == [1, 3] and list(registry.added(str)) == ["a"]

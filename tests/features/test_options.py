@@ -15,7 +15,6 @@ import pytest
 from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
-from multidrop.base.registry import FeatureEntry
 from multidrop.shell import hooks
 from multidrop.shell.configuration import Settings
 from multidrop.shell.hooks import Options
@@ -24,6 +23,7 @@ from multidrop.shell.relaying import Lent, lender, ports
 from multidrop.shell.session import Session
 from multidrop.tui import launch
 from tests.support.front_door import Called, Command, Done, at_terminal
+from tests.support.own_features import load
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,10 +44,9 @@ class Two:
 @pytest.fixture
 def add(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
     monkeypatch.setattr(registry, "IN_WHEEL", {})
-    monkeypatch.setattr(registry, "_others", {})
 
     def added(*adds: object) -> None:
-        registry._others["p"] = FeatureEntry("x", "dist", "1", "p"), Feature("x", "adds options", adds=adds)
+        load(monkeypatch, Feature("x", "adds options", adds=adds))
 
     yield added
 

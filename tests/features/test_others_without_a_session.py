@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import pytest
 from multidrop.base import registry
 from multidrop.simulator import cells
 from tests.support.front_door import Command
+from tests.support.own_features import forget_loaded, own, wheel_unread
 from tests.support.paths import THERE
 
 GATE = """
@@ -38,16 +38,7 @@ FEATURE = Feature("shop", "a shop", adds=(Section("shop", ("hall",), "[shop]", r
 
 @pytest.fixture(autouse=True)
 def none_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_others", "_failed"):
-        monkeypatch.setattr(registry, name, {})
-    monkeypatch.setattr(registry, "_untold", [])
-
-
-def write(folder: Path, name: str, text: str) -> Path:
-    path = folder / "conf" / "features" / f"{name}.py"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-    return path
+    forget_loaded(monkeypatch)
 
 
 def test_a_cell_file_that_is_read_without_a_session_may_have_endpoints_by_others(
@@ -56,7 +47,7 @@ def test_a_cell_file_that_is_read_without_a_session_may_have_endpoints_by_others
     cell = '[[bus]]\nname = "b"\nserve = ["gate://127.0.0.1:0"]\n[[bus.drive]]\npersonality = "LMDCM"\n'
     monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path / "conf"))
     monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
-    write(tmp_path, "gate", GATE)
+    own(tmp_path, "gate", GATE)
     assert [each.scheme for each in cells.read(cell).buses[0].serve] == ["gate"]
 
 
@@ -72,7 +63,7 @@ def test_a_cell_file_that_is_read_without_a_session_may_have_endpoints_by_others
 def test_a_table_that_a_feature_cannot_read_is_one_line_with_its_place(
     failure: str, said: str, tmp_path: Path, multidrop: Command
 ) -> None:
-    write(tmp_path, "shop", SHOP.replace("{failure}", failure))
+    own(tmp_path, "shop", SHOP.replace("{failure}", failure))
     (tmp_path / "conf" / "multidrop.toml").write_text('[log]\nalways = true\n[shop]\nhall = "7"\n')
     checked = multidrop("config", "check")
     assert checked.returncode == 2
@@ -87,7 +78,7 @@ from multidrop.shell.operations.operation import Operation
 
 FEATURE = Feature("gate", "a gate", adds=(Operation(lambda: 1 / 0, command="gate", meaning="open it"),))
 """
-    write(tmp_path, "gate", text)
+    own(tmp_path, "gate", text)
     done = multidrop("gate")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "the feature gate failed at gate.py:5: ZeroDivisionError: division by zero\n"
@@ -174,7 +165,7 @@ class Twin:
     twin: bool = False
 
 """
-    path = write(tmp_path, "gate", f'{imports}FEATURE = Feature("gate", "a gate", adds=({adds},))\n')
+    path = own(tmp_path, "gate", f'{imports}FEATURE = Feature("gate", "a gate", adds=({adds},))\n')
     done = multidrop("help", "MR")
     assert done.stderr == f"warning: the feature gate ({path}) cannot be loaded: {why}\n" and done.returncode == 0
 
@@ -197,26 +188,26 @@ FEATURE = Feature("gate", "a gate", adds=(
 
 
 def test_a_verb_that_is_not_async_is_done(tmp_path: Path, multidrop: Command) -> None:
-    write(tmp_path, "gate", VERB)
+    own(tmp_path, "gate", VERB)
     done = multidrop("send", "sim:#press", "/gate")
     assert (done.returncode, done.stdout, done.stderr) == (0, "open\n", "imported\n")
 
 
 def test_a_verb_that_interrupts_itself_is_one_line(tmp_path: Path, multidrop: Command) -> None:
     text = VERB.replace('print("imported")', "").replace('def gate(call):\n    call.session.output("open")', ENDS)
-    write(tmp_path, "gate", text)
+    own(tmp_path, "gate", text)
     done = multidrop("send", "sim:#press", "/gate")
     assert (done.returncode, done.stderr) == (2, "the feature gate failed at gate.py:8: KeyboardInterrupt\n")
 
 
 def test_what_a_feature_prints_as_it_is_imported_is_no_reply(tmp_path: Path, multidrop: Command) -> None:
-    write(tmp_path, "gate", VERB)
+    own(tmp_path, "gate", VERB)
     done = multidrop("send", "sim:#press", "@a PR P")
     assert (done.returncode, done.stdout, done.stderr) == (0, "0\n", "imported\n")
 
 
 def test_a_part_of_a_group_without_an_example_is_in_its_help(tmp_path: Path, multidrop: Command) -> None:
-    write(tmp_path, "gate", VERB)
+    own(tmp_path, "gate", VERB)
     done = multidrop("log", "--help")
     assert done.returncode == 0 and "multidrop log show" in done.stdout
 
@@ -232,12 +223,12 @@ def test_a_feature_of_the_wheel_that_cannot_be_imported_keeps_nothing_else_from_
         return real(name, *given)
 
     monkeypatch.setattr(registry.importlib, "import_module", broken)
-    monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
+    wheel_unread(monkeypatch)
     used = multidrop("share", "sim:", "--rfc2217", "0")
     why = "the feature sharing cannot be loaded: SyntaxError: invalid syntax; install multidrop again, whole"
     assert (used.returncode, used.stdout, used.stderr) == (2, "", f"share: {why}\n")
     registry.warnings()
-    monkeypatch.setattr(registry, "wheel", cache(registry._wheel))
+    wheel_unread(monkeypatch)
     warning = "the feature sharing (multidrop) cannot be loaded: SyntaxError: invalid syntax"
     sent = multidrop("send", "sim:#press", "@a PR P")
     assert (sent.returncode, sent.stdout) == (0, "0\n") and sent.stderr.count(warning) == 1

@@ -14,10 +14,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.base import registry
 from multidrop.base.errors import Stopped
 from multidrop.base.feature import Feature
-from multidrop.base.registry import FeatureEntry
 from multidrop.cli import parse
 from multidrop.drives.events import Changed
 from multidrop.shell.at_session import AtSession
@@ -31,6 +29,7 @@ from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import Transport
 from tests.support import foreign_features as foreign
+from tests.support import own_features
 from tests.support.cell_session import TCP, CellSession, bus, party
 from tests.support.foreign_features import ASYNC, CALLS, NAMES, Slowness
 
@@ -57,10 +56,8 @@ def raising(*_: Any) -> None:
 
 @pytest.fixture
 def add(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
-    monkeypatch.setattr(registry, "_others", {})
-
     def added(*adds: object) -> None:
-        registry._others["p"] = FeatureEntry("x", "dist", "1", "p"), Feature("x", "tries to be in the way", adds=adds)
+        own_features.load(monkeypatch, Feature("x", "tries to be in the way", adds=adds))
 
     yield added
 

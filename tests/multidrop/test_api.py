@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from multidrop import Diagnostic, DriveError, Refused, Stopped, TransportLost, connect_async
-from tests.support import api_program
-from tests.support.cell_session import ETHERNET, bus, moves, party, pmx
+from tests.support import api_program, behind_api
+from tests.support.behind_api import break_off, floor_of
+from tests.support.cell_session import ETHERNET, bus, party, pmx
 from tests.support.virtual import VirtualLoop
 
 pytestmark = pytest.mark.virtual
@@ -28,8 +29,7 @@ def url(tmp_path: Path) -> str:
 
 def moving(session: Any) -> set[str]:
     """The drives that move, in the simulator."""
-    floor = next(iter(session._shell.cells.values()))
-    return {each.spec.name for each in floor.floor.drives if moves(each.device, floor.now())}
+    return behind_api.moving(floor_of(session))
 
 
 async def test_lines_words_and_moves(url: str) -> None:
@@ -241,7 +241,7 @@ async def test_an_interruption_stops_and_the_session_goes_on(url: str) -> None:
             await a.move(FAR)
             waiting = asyncio.create_task(a.wait())
             await asyncio.sleep(0.5)
-            await session._break_off()
+            await break_off(session)
             with pytest.raises(Stopped, match="interrupted"):
                 await waiting
             assert moving(session) == set()
@@ -252,7 +252,7 @@ async def test_a_call_during_an_interruption_sends_nothing(url: str) -> None:
     async with connect_async(f"{url}#press") as session:
         a = session.drive("a")
         await a.move(FAR)
-        interrupting = asyncio.create_task(session._break_off())
+        interrupting = asyncio.create_task(break_off(session))
         await asyncio.sleep(0)
         with pytest.raises(Stopped, match="nothing was sent"):
             await a.move(FAR)
@@ -304,12 +304,12 @@ async def test_an_interrupted_macro_executes_its_last_lines(
         playing = asyncio.create_task(session.send("/play go"))
         await asyncio.sleep(2)
         assert moving(session) == {"a"}
-        await session._break_off()
+        await break_off(session)
         with pytest.raises(Stopped, match="interrupted"):
             await playing
         assert moving(session) == set() and await session.drive("a").read("R1") == 5
         await session.drive("a").move(FAR)
-        await session._break_off()
+        await break_off(session)
         assert moving(session) == set()
 
 

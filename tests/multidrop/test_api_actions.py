@@ -16,6 +16,7 @@ from multidrop import (
 )
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
+from tests.support.behind_api import shell_of
 from tests.support.cell_session import bus, drive, pmx
 
 pytestmark = pytest.mark.virtual
@@ -45,7 +46,7 @@ def bytes_out(session: AsyncSession) -> list[bytes]:
         if isinstance(event, OnBus) and isinstance(event.event, Traffic) and event.event.outgoing:
             found.append(event.event.data)
 
-    session._shell.subscribe(take)
+    shell_of(session).subscribe(take)
     return found
 
 

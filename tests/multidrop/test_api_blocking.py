@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 
 from multidrop import Diagnostic, Refused, Session, Stopped, connect, connect_async
-from multidrop.api import endings, threads
-from tests.support import api_program
-from tests.support.cell_session import bus, moves, party
+from multidrop.api import threads
+from tests.support import api_program, behind_api
+from tests.support.behind_api import awaited, end_all, floor_of, thread_of
+from tests.support.cell_session import bus, party
 from tests.support.until import PATIENCE
 from tests.support.virtual import VirtualLoop
 
@@ -46,17 +47,17 @@ def session(url: str) -> Iterator[Session]:
 
 def floor(session: Session) -> Any:
     """The simulated cell, which outlives the session."""
-    return next(iter(session._awaited._shell.cells.values()))
+    return floor_of(awaited(session))
 
 
 def moving(cell: Any) -> set[str]:
     """The drives that move, in the simulator, once the last ramp is over."""
-    return {each.spec.name for each in cell.floor.drives if moves(each.device, cell._now + 1.0)}
+    return behind_api.moving(cell, later=1.0)
 
 
 def soon(session: Session, seconds: float, function: Any) -> None:
     """Call a function in the session's thread, in a while."""
-    session._thread.soon(lambda: asyncio.get_running_loop().call_later(seconds, function))
+    thread_of(session).soon(lambda: asyncio.get_running_loop().call_later(seconds, function))
 
 
 def test_lines_moves_and_words(session: Session) -> None:
@@ -146,16 +147,16 @@ def test_an_interruption_of_a_call_stops_at_once(
 
     def begin(work: Any) -> Any:
         future = ordinary(work)
-        monkeypatch.setattr(session._thread, "begin", ordinary)
+        monkeypatch.setattr(thread_of(session), "begin", ordinary)
         soon(session, after, lambda: os.kill(os.getpid(), signal.SIGINT))
         return future
 
-    ordinary, a, before = session._thread.begin, session.drive("a"), signal.signal(signal.SIGINT, handler)
+    ordinary, a, before = thread_of(session).begin, session.drive("a"), signal.signal(signal.SIGINT, handler)
     try:
         for _ in range(2):
             a.send(RUN)
             assert moving(floor(session)) == {"a"}
-            monkeypatch.setattr(session._thread, "begin", begin)
+            monkeypatch.setattr(thread_of(session), "begin", begin)
             with pytest.raises(ends):
                 a.wait(timeout=80000)
             assert moving(floor(session)) == set()
@@ -191,8 +192,8 @@ def test_the_end_of_the_process_stops_what_is_open(url: str) -> None:
     session = connect(url)
     cell = floor(session)
     session.drive("a").send(RUN)
-    endings._end_all()
-    assert moving(cell) == set() and not session._thread.alive
+    end_all()
+    assert moving(cell) == set() and not thread_of(session).alive
 
 
 @pytest.mark.parametrize("name", ["TERM", "HUP", "QUIT", "ALRM", "USR1", "USR2", "XCPU"])
@@ -235,15 +236,15 @@ def test_a_stop_whose_report_is_interrupted_is_a_stop_all_the_same(
         def result(self) -> None:
             raise KeyboardInterrupt
 
-    begin = session._thread.begin
+    begin = thread_of(session).begin
 
     def first(work: Any) -> Interrupted:
-        monkeypatch.setattr(session._thread, "begin", begin)
+        monkeypatch.setattr(thread_of(session), "begin", begin)
         work.close()
         return Interrupted()
 
     session.drive("a").run_at(1000)
-    monkeypatch.setattr(session._thread, "begin", first)
+    monkeypatch.setattr(thread_of(session), "begin", first)
     with pytest.raises(KeyboardInterrupt):
         session.stop()
     with pytest.raises(Stopped):

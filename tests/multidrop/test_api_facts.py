@@ -10,8 +10,9 @@ import pytest
 
 from multidrop import AsyncDrive, AsyncSession, Diagnostic, Inexpressible, Refused, connect_async
 from multidrop.drives.events import Traffic
+from tests.support.behind_api import drive_of, floor_of, moving, shell_of
 from tests.support.cases import for_each
-from tests.support.cell_session import bus, drive, moves, party, pmx
+from tests.support.cell_session import bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual
 
@@ -32,7 +33,7 @@ class Asked:
 
     def __init__(self, session: AsyncSession, bus: str) -> None:
         self.count, self._bus = 0, bus
-        session._shell.subscribe(self._take, Traffic)
+        shell_of(session).subscribe(self._take, Traffic)
 
     def _take(self, event: Any) -> None:
         if event.bus == self._bus and event.event.outgoing:
@@ -48,21 +49,21 @@ def axes(session: AsyncSession) -> dict[str, bool]:
 
 
 async def test_a_session_that_is_closed_lets_its_drives_go_on(session: AsyncSession) -> None:
-    cell: Any = next(iter(session._shell.cells.values()))
+    cell: Any = floor_of(session)
     await session.drive("press:b").run_at(1000)
     await session.close()
-    assert [each.spec.name for each in cell.floor.drives if moves(each.device, cell.now() + 1.0)] == ["b"]
+    assert moving(cell, later=1.0) == {"b"}
     assert repr(session) == "<multidrop: a closed session>"
 
 
 async def test_a_position_that_does_not_count_is_that_of_its_axis_and_of_the_drive(session: AsyncSession) -> None:
-    state = session.drive("pmx:00")._drive.state
+    state = drive_of(session.drive("pmx:00")).state
     assert all(axes(session).values()) and session.drive("press:a").referenced
     state.reference_lost(["x"])
     assert axes(session) == {"": False, "x": False, "y": True, "X": False, "Y": True}
     state.reference_lost(["x", "y"])
     assert not any(axes(session).values())
-    session.drive("press:a")._drive.state.reference_lost([""])
+    drive_of(session.drive("press:a")).state.reference_lost([""])
     assert not session.drive("press:a").referenced and session.drive("press:b").referenced
     await session.drive("press:a").accept()
     assert session.drive("press:a").referenced
@@ -189,7 +190,7 @@ async def test_a_backup_to_a_file_that_exists_asks_nothing(session: AsyncSession
 
 
 async def test_telemetry_reads_fifty_times_a_second_unless_it_is_told(session: AsyncSession) -> None:
-    read = session._shell.buses["press"].telemetry
+    read = shell_of(session).buses["press"].telemetry
     begin: Any
     for begin, rate in (
         (session.drive("press:a").telemetry, 50),

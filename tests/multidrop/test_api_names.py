@@ -15,6 +15,7 @@ from multidrop import Session, connect
 from multidrop.api import threads
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.shell.operations.table import COMMANDS
+from tests.support.behind_api import awaited
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.paths import ROOT
@@ -45,7 +46,7 @@ def test_what_tab_shows_is_on_the_page_and_awaited_by_the_same_name(session: Ses
     a = session.drive("a")
     for each in (session, a, a.programs, a.parameters, session.telemetry(), session.events()):
         assert {name for name in public(each) if name not in PAGE} == set()
-    assert public(a) == public(a._awaited) and public(session) - {"live"} == public(session._awaited)
+    assert public(a) == public(awaited(a)) and public(session) - {"live"} == public(awaited(session))
 
 
 def test_a_session_and_a_drive_say_what_they_are(session: Session) -> None:
@@ -76,7 +77,7 @@ SETTABLE = ("axis", "programs", "parameters")
 
 def test_a_name_that_is_set_by_mistake_is_refused_and_hides_nothing(session: Session) -> None:
     a = session.drive("a")
-    for each in (a, a._awaited, session, session._awaited, a.programs, a.parameters):
+    for each in (a, awaited(a), session, awaited(session), a.programs, a.parameters):
         for name in sorted({*public(each), "postion", "VM"}):
             with pytest.raises(AttributeError, match=f"^{name} of a [A-Za-z]+ .*cannot be set"):
                 setattr(each, name, 0)
@@ -92,11 +93,11 @@ def test_a_class_that_a_program_derives_has_names_of_its_own(session: Session) -
     class Stage(multidrop.Drive):
         pitch = 5.0
 
-        def __init__(self, drive: multidrop.Drive) -> None:
-            super().__init__(drive._session, drive._awaited)
+        def __init__(self, session: Session, drive: multidrop.Drive) -> None:
+            super().__init__(session, awaited(drive))
             self.offset = 3
 
-    stage = Stage(session.drive("a"))
+    stage = Stage(session, session.drive("a"))
     stage.offset = 4
     assert (stage.offset, stage.position) == (4, 0)
     with pytest.raises(AttributeError, match="position of a Stage cannot be set"):

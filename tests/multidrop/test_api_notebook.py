@@ -16,7 +16,9 @@ import pytest
 from multidrop import Diagnostic, Session, TransportLost, connect, read_rrd
 from multidrop.api import threads
 from multidrop.api.threads import LoopEnded, LoopThread
-from tests.support.cell_session import bus, moves, party
+from tests.support import behind_api
+from tests.support.behind_api import awaited, floor_of
+from tests.support.cell_session import bus, party
 from tests.support.foreign_features import delete_features
 from tests.support.virtual import VirtualLoop
 
@@ -78,8 +80,7 @@ def session(url: str, kernel: Kernel) -> Iterator[Session]:
 
 def moving(session: Session) -> set[str]:
     """The drives that move, in the simulator, once the last ramp is over."""
-    floor: Any = next(iter(session._awaited._shell.cells.values()))
-    return {each.spec.name for each in floor.floor.drives if moves(each.device, floor._now + 1.0)}
+    return behind_api.moving(floor_of(awaited(session)), later=1.0)
 
 
 def test_an_interrupted_cell_stops_what_the_session_moves(session: Session, kernel: Kernel) -> None:

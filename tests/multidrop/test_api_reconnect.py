@@ -12,6 +12,7 @@ from multidrop import AsyncSession, DriveError, Lost, Timeout, TransportLost, Un
 from multidrop.api.returns import Returns
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
+from tests.support.behind_api import shell_of
 from tests.support.cell_session import bus, drive, party, pmx
 
 pytestmark = pytest.mark.virtual
@@ -30,7 +31,7 @@ class Shop:
     def __init__(self, session: AsyncSession, name: str) -> None:
         self.session, self.a = session, session.drive(name)
         self.sent: list[bytes] = []
-        session._shell.subscribe(self._take)
+        shell_of(session).subscribe(self._take)
 
     def _take(self, event: Any) -> None:
         if isinstance(event, OnBus) and isinstance(event.event, Traffic) and event.event.outgoing:
@@ -317,7 +318,7 @@ async def test_a_loss_while_it_is_compared_holds_it_for_the_next_return(tmp_path
         await shop.world("unplug line", "power a off", "power a on")
         await asyncio.sleep(1)
         await shop.world("plug line")
-        while session._shell.buses["line"].link.away is not None:
+        while shell_of(session).buses["line"].link.away is not None:
             await asyncio.sleep(0.001)
         await shop.world("unplug line")
         await asyncio.sleep(2)

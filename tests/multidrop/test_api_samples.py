@@ -12,6 +12,7 @@ import pytest
 
 from multidrop import Sample, Samples, TransportLost, connect_async
 from multidrop.api import telemetry
+from tests.support.behind_api import shell_of
 from tests.support.cell_session import bus, party, pmx
 
 FAR = 10**8
@@ -38,7 +39,7 @@ async def test_telemetry_follows_a_move_and_ends_with_its_block(url: str) -> Non
         assert steps and all(0.04 < each < 0.07 for each in steps)
         assert max(each.velocity for each in samples) > 0 == opened.missed
         assert [each async for each in opened] == [] and len(await opened.samples()) == 0
-        polled = session._shell.buses["press"].telemetry
+        polled = shell_of(session).buses["press"].telemetry
         assert polled.period("a") == math.inf
 
 

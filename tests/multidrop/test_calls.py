@@ -20,6 +20,7 @@ from multidrop.api.calls import Calls, Lost, lost
 from multidrop.api.threads import LoopThread
 from multidrop.base.errors import Diagnostic, Stopped, TransportLost
 from multidrop.shell.streams import stdout
+from tests.support.behind_api import end_all
 from tests.support.cell_session import bus, party
 from tests.support.virtual import VirtualLoop
 
@@ -103,7 +104,7 @@ def test_a_session_that_is_open_at_the_end_of_the_process_says_that_no_drive_was
 ) -> None:
     async def work(session: Any) -> None:
         with caplog.at_level(logging.WARNING):
-            endings._end_all()
+            end_all()
 
     on_a_line(tmp_path, work)
     text = "a session was not closed; the stop of its lines was sent, and no drive was asked"

@@ -19,6 +19,7 @@ from multidrop import script
 from multidrop.api import threads
 from multidrop.commands import python_program
 from multidrop.shell.batch.virtual_loop import VirtualLoop
+from tests.support.behind_api import thread_of
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command, Done
@@ -81,10 +82,10 @@ class Keys(ModuleType):
     def press(self, session: Any) -> None:
         """As a keyboard does: its thread writes the stop, then the loop takes over."""
         self._ahead()
-        session._thread.soon(self._stop)
+        thread_of(session).soon(self._stop)
 
     def hang_up(self, session: Any) -> None:
-        session._thread.soon(self._gone)
+        thread_of(session).soon(self._gone)
 
 
 @pytest.fixture

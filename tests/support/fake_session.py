@@ -531,9 +531,19 @@ def driver_of(app: Any) -> Any:
     return app._driver
 
 
+def compositor_of(screen: Any) -> Any:
+    """What lays a screen out and paints it; Textual has no public name for it."""
+    return screen._compositor
+
+
 def painted(screen: Any) -> list[Any]:
     """The rows of a screen as they are painted."""
-    return screen._compositor.render_strips(screen.app.size)
+    return compositor_of(screen).render_strips(screen.app.size)  # type: ignore[no-any-return]
+
+
+def binding_of(app: MultidropApp, key: str) -> Any:
+    """What a key does now: its binding, the node of its action, and whether that is possible; None: nothing."""
+    return app.keyboard._binding(key)
 
 
 def toasts(app: MultidropApp) -> list[str]:
@@ -543,7 +553,7 @@ def toasts(app: MultidropApp) -> list[str]:
 
 def readable(pilot: Pilot[int]) -> None:
     """Keys have paused after the screen changed by itself: they count from here on."""
-    pilot.app.keyboard._deaf_until = 0.0  # type: ignore[attr-defined]
+    pilot.app.keyboard.hear()  # type: ignore[attr-defined]
 
 
 async def settle(pilot: Pilot[int]) -> None:

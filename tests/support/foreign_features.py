@@ -23,7 +23,6 @@ from multidrop.base import registry
 from multidrop.base.errors import Diagnostic
 from multidrop.base.feature import Feature
 from multidrop.base.foreign import guarded
-from multidrop.base.registry import FeatureEntry
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.usb import UsbModule
 from multidrop.shell import configuration, plot_targets, relaying
@@ -48,6 +47,7 @@ from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import Transport, Unreachable
 from multidrop.tui.app import look_troubles
 from tests.support.cell_session import bus, party
+from tests.support.own_features import load
 from tests.support.paths import ROOT
 
 CORE = ("base", "dialects", "drives", "families", "macros", "multidrop", "shell", "simulator", "transports", "tui")
@@ -215,7 +215,7 @@ def add(monkeypatch: pytest.MonkeyPatch, *adds: object) -> Feature:
     """Let these records be all that any feature adds: those of `x`, which is by others."""
     feature = guarded(Feature("x", "tries to be in the way", adds=adds))
     monkeypatch.setattr(registry, "IN_WHEEL", {})
-    monkeypatch.setattr(registry, "_others", {"p": (FeatureEntry("x", "dist", "1", "p"), feature)})
+    load(monkeypatch, feature)
     return feature
 
 

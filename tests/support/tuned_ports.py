@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.shell.configuration import Settings
+from multidrop.shell.connect import opening
 from multidrop.shell.connect.opening import OpenedBus
 from multidrop.shell.events import Notified, Output, Progressed
 from multidrop.shell.session import Session
@@ -16,6 +20,11 @@ from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.wire import resample
 from multidrop.transports import Transport
+
+
+def lead_to(monkeypatch: pytest.MonkeyPatch, transport: Callable[..., Awaitable[Any]]) -> None:
+    """Have every port that a session opens be what this makes of its connection, time limit and baud rate."""
+    monkeypatch.setattr(opening, "_transport", transport)
 
 
 class TunedPipe(Transport):

@@ -23,6 +23,7 @@ from multidrop.tui.panels import table
 from multidrop.tui.panels.table import LAYOUTS, PANELS
 from multidrop.tui.screens import dialogs, start
 from multidrop.tui.screens.page import PAGES
+from tests.support.fake_session import painted
 from tests.support.real_screen import real_screen, until
 
 pytestmark = pytest.mark.tui
@@ -39,8 +40,7 @@ def boom(*_: Any, **__: Any) -> Any:
 
 def text_of(screen: Screen[Any]) -> str:
     """What a screen shows."""
-    strips = screen._compositor.render_strips()
-    return " ".join("".join(segment.text for segment in strip) for strip in strips)
+    return " ".join("".join(segment.text for segment in strip) for strip in painted(screen))
 
 
 class Machine:
@@ -61,7 +61,7 @@ class Machine:
     async def holds(self, place: str) -> None:
         """The stop is sent and confirmed, and another line is served."""
         stops = self.session.stops
-        assert self.app.is_running and not self.app._exit, place
+        assert self.app.is_running and self.app.return_code is None, place
         await self.pilot.press("ctrl+x")
         assert self.session.stops == stops + 1, place
         await self.until(lambda: all(each.fate is Fate.STANDING for each in self.session.tally().found))
@@ -106,7 +106,7 @@ async def test_a_defect_in_any_panel_is_shown_in_its_place(tmp_path: Path, monke
             await it.begin()
             with monkeypatch.context() as planted:
                 planted.setattr(table, "PANELS", alone(panel.name, rows=boom))
-                monkeypatch.setattr(main.panels, "_by_hand", {})
+                monkeypatch.setattr(main, "panels", table.ShownPanels())
                 # A place is listed by its first panel, so the one under test is shown alone in the left part.
                 planted.setattr(
                     table, "LAYOUTS", {key: {"panel": ((panel.name,),), "side": (("drive",),)} for key in LAYOUTS}

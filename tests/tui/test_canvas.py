@@ -17,7 +17,7 @@ from textual.strip import Strip
 
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.terminal.canvas import Canvas, FrontCompositor, Pens, pieces_of
-from tests.support.fake_session import demo_session, make_app, press, settle
+from tests.support.fake_session import compositor_of, demo_session, make_app, press, settle
 
 WIDTH, HEIGHT = 30, 8
 STYLES = [
@@ -222,7 +222,7 @@ def test_the_pen_changes_by_as_little_as_possible() -> None:
 
 def picture(app: MultidropApp, kind: type[Compositor], crop: Region, rows: set[int]) -> dict[int, list[object]]:
     """The pieces of these rows as the terminal is shown them."""
-    compositor = app.screen._compositor
+    compositor = compositor_of(app.screen)
     chops = kind._render_chops(compositor, crop, rows.__contains__)  # type: ignore[arg-type]
     spans = [(y, crop.x, crop.right) for y in sorted(rows)]
     update = ChopsUpdate(chops, spans, [cuts[1:] for cuts in compositor.cuts])  # type: ignore[arg-type]

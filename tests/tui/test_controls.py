@@ -261,10 +261,9 @@ async def test_of_a_drive_that_is_not_shown_yet_the_stop_alone_is_sent(key: str,
     async with on_screen() as (pilot, app, session):
         await settle(pilot)
         page = ControlsPage(app)
-        await app.push_screen(page)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(page, "show", lambda view: None)
-            page._view = None
+            await app.push_screen(page)
             await pilot.press(key)
             await pilot.pause()
         assert session.sent == sent
@@ -284,7 +283,7 @@ async def test_a_drive_that_is_selected_by_itself_moves_only_after_a_pause_and_s
         assert session.sent == []
         await press(pilot, "space")
         assert session.sent == ["press:b SL 0"]
-        app.keyboard._deaf_until = 0.0  # a pause
+        app.keyboard.hear()  # a pause
         session.time += 1
         await emit(pilot, OnBus("press", Sample(session.time - 0.05, "b", 0, 0)))
         await press(pilot, "right")

@@ -45,7 +45,7 @@ async def reported(it: Machine) -> None:
 
 @case
 async def the_report_of_a_defect(it: Machine, planted: pytest.MonkeyPatch) -> None:
-    planted.setattr(it.app.boundary, "_say", boom)  # type: ignore[attr-defined]
+    planted.setattr(it.app.main, "page", boom)  # type: ignore[attr-defined]
     planted.setattr("multidrop.tui.presenter.top_row", boom)
     tap(it, "P", "R")
     await reported(it)
@@ -88,7 +88,7 @@ async def what_moves_at_a_quit(it: Machine, planted: pytest.MonkeyPatch) -> None
 
 @case
 async def the_work_on_keys(it: Machine, planted: pytest.MonkeyPatch) -> None:
-    planted.setattr(it.app.keyboard, "_do", boom)  # type: ignore[attr-defined]
+    planted.setattr(it.app, "run_action", boom)  # type: ignore[attr-defined]
     tap(it, "f1", "P")
     await reported(it)
 
@@ -102,7 +102,7 @@ async def a_typed_line(it: Machine, planted: pytest.MonkeyPatch) -> None:
 
 @case
 async def another_size(it: Machine, planted: pytest.MonkeyPatch) -> None:
-    planted.setattr(it.app, "_check_size", boom)
+    planted.setattr("multidrop.tui.app.TooSmall", type("Planted", (), {"__init__": boom}))
     resize(it, 20, 5)
     await reported(it)
 

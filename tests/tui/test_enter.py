@@ -3,7 +3,8 @@
 import pytest
 from textual import events
 
-from tests.support.fake_session import demo_session, make_app, on_screen
+from multidrop.tui.app import bindings
+from tests.support.fake_session import binding_of, demo_session, make_app, on_screen
 
 pytestmark = pytest.mark.tui
 
@@ -49,8 +50,8 @@ async def test_a_key_finds_the_binding_that_is_active(keys: list[str]) -> None:
         await pilot.press(*keys)
         active = app.screen.active_bindings
         assert "escape" in active
-        for key in {key for _, bindings in app.screen._binding_chain for key in bindings.key_to_bindings}:
-            found, expected = app.keyboard._binding(key), active.get(key)
+        for key in {*active, *(key for row in bindings() for key in row.key.split(","))}:
+            found, expected = binding_of(app, key), active.get(key)
             assert found == (expected and (expected.binding, expected.node, expected.enabled)), key
 
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.tui
 
 @pytest.fixture(autouse=True)
 def no_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Frames, "_frame", lambda self: None)
+    monkeypatch.setattr(Frames, "wake", lambda self, panels=True: None)
 
 
 async def test_a_reply_is_painted_once_the_terminal_has_swallowed_the_frame_before() -> None:
@@ -43,19 +43,17 @@ async def test_a_reply_is_painted_once_the_terminal_has_swallowed_the_frame_befo
         session.gate.set()
 
 
-async def test_a_line_that_is_typed_and_sent_changes_no_layout(monkeypatch: pytest.MonkeyPatch) -> None:
-    app, layouts = make_app(), []
+async def test_a_line_that_is_typed_and_sent_changes_no_layout() -> None:
+    app, layouts = make_app(), list[object]()
     async with app.run_test(size=(80, 24)) as pilot:
         app.tick()
         await pilot.press(*"MR 5")  # with a list of completions at first, which does
-        app.main._refresh_layout()
-        app.main._layout_required = False
-        lay_out = app.main._refresh_layout
-        monkeypatch.setattr(app.main, "_refresh_layout", lambda *a, **k: (layouts.append(1), lay_out(*a, **k)))
+        await pilot.pause()
+        app.main.screen_layout_refresh_signal.subscribe(app.main, layouts.append, immediate=True)
         await pilot.press(*"12", "enter")
         app.tick()
         await pilot.pause()
-        assert not (layouts or app.main._layout_required) and "MR 512" in app.main.page("press").plain
+        assert not layouts and "MR 512" in app.main.page("press").plain
 
 
 def paints(*lines: int) -> list[int]:

@@ -59,13 +59,12 @@ class Bench:
             app.screen.dismiss(None)
         await self.screen.rest()
         session.select("a", "press")
-        session.busy, session.latched, session.recording, session.stops = busy, False, "", 0
+        session.busy, session.latched, session.recording = busy, False, ""
         session.time += 1  # a key pressed again is no held key
-        app._stops = 0
         app.leaving.over = app.keyboard._closed = app.outbox._closed = session.quitting = (
             False  # no exit is carried out
         )
-        app.keyboard._deaf_until = 0.0
+        app.keyboard.hear()
         app.selection.follow()
         app.main.take_lines()
         app.outbox.drop()
@@ -75,6 +74,7 @@ class Bench:
         self.assist.kept = ["VM=600000", "MR 512000", "PR P"]
         session.sent.clear()
         self.screen.exits.clear()
+        self.stops_before = session.stops
 
     async def _typed(self, groups: list[bytes], busy: bool, slow: int) -> dict[str, object]:
         await self._afresh(busy)
@@ -100,7 +100,7 @@ class Bench:
             "selected": (self.session.selected_bus, self.session.addresses[self.session.selected_bus]),
             "screens": [type(screen).__name__ for screen in self.screen.app.screen_stack],
             "exits": list(self.screen.exits),
-            "stops": self.session.stops,
+            "stops": self.session.stops - self.stops_before,
             "kept": list(self.assist.kept),
         }
 

@@ -107,7 +107,7 @@ async def test_keys_typed_before_the_question_answer_nothing_and_after_a_no_the_
         await screen.until(lambda: isinstance(screen.app.screen, Confirm))
         await screen.rest()
         assert (screen.exits, session.stops) == ([], 0), "Enter stops all and quits, but it was typed before"
-        monkeypatch.setattr(screen.app.keyboard, "_deaf_until", 0.0)
+        screen.app.keyboard.hear()
         await screen.type(answer)
         await screen.until(lambda: screen.app.screen is screen.app.main)
         await screen.shows("not sent, as it was typed after a quit: SL 200000")

@@ -206,8 +206,10 @@ class Slow(FakeSession):
     """Opens a port on request."""
 
     gate: asyncio.Event
+    opening = False
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[FakeBus]:
+        self.opening = True
         await self.gate.wait()
         return await super().open(url, name)
 
@@ -236,7 +238,7 @@ async def test_while_a_bus_is_being_opened_one_can_stop_and_quit() -> None:
     session.gate = asyncio.Event()
     async with demo(session) as (screen, _, _):
         screen.write(b"sim:\rMR 5\r")
-        await screen.until(lambda: screen.app.screen._opening)  # type: ignore[attr-defined]
+        await screen.until(lambda: session.opening)
         screen.write(b"\x18")
         await screen.until(lambda: session.stops == 1)
         screen.write(b"MR 6\r\x11")

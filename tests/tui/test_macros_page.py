@@ -58,7 +58,9 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
     async with on_screen(session) as (pilot, app, _):
         await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
-        await until(pilot, lambda: app.screen._painted)  # type: ignore[attr-defined]
+        await until(pilot, lambda: app.keyboard.idle)
+        app.model.changed = True
+        await settle(pilot)
         await pilot.press("down", "enter")
         for _ in range(500):
             await pilot.pause(0.01)

@@ -213,7 +213,7 @@ async def test_the_other_half_shows_one_drive_and_a_key_types_to_it(size: tuple[
 
 async def test_the_other_half_of_a_closed_line_goes_and_the_palette_ends_the_split() -> None:
     async with on_screen() as (pilot, app, session):
-        app.act._show_half("", "eth")
+        await press(pilot, *SPLIT, *"all of the eth", "enter")
         await emit(pilot, Entered(session.time, "PR MV", By.OPERATOR, "eth", ""))
         assert "PR MV" in app.main.beside.transcript.plain
         session.buses.pop("eth")

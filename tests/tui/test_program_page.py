@@ -265,7 +265,7 @@ async def test_keys_that_are_typed_while_a_slow_disk_reads_the_file_wait_for_it(
         try:
             typed(pilot, "a.mxt", "enter", "end", "Z")
             await until(pilot, lambda: isinstance(app.screen, ProgramPage))
-            await until(pilot, lambda: app.keyboard.idle or app.keyboard._held)
+            await until(pilot, lambda: app.keyboard.idle or app.keyboard.held)
             assert not app.keyboard.idle
         finally:
             gate.set()

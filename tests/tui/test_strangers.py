@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.fake_session import painted
 from tests.support.foreign_device import device
 from tests.support.real_screen import real_screen, until
 
@@ -23,5 +24,5 @@ async def test_nothing_is_polled_and_a_typed_line_is_all_that_is_sent(tmp_path: 
             await until(pilot, lambda: plc.received)
             await pilot.pause(0.3)
             assert plc.received == ["10 0043"]
-            shown = "\n".join(line.text for line in pilot.app.screen._compositor.render_strips())
+            shown = "\n".join(line.text for line in painted(pilot.app.screen))
             assert "not identified" in shown and "did not identify itself" in shown

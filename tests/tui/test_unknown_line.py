@@ -8,7 +8,6 @@ import pytest
 
 from multidrop.base.errors import Diagnostic
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect import opening
 from multidrop.shell.finding import scanning
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
@@ -19,11 +18,12 @@ from multidrop.tui.assist import Assist
 from multidrop.tui.screens.dialogs import GoOn
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.start import Start
+from multidrop.tui.widgets.bars import top_row
 from tests.support.cell_session import bus, drive
 from tests.support.fake_session import readable, settle
 from tests.support.posix import pty, tty
 from tests.support.real_screen import real_screen, until
-from tests.support.tuned_ports import TunedPipe
+from tests.support.tuned_ports import TunedPipe, lead_to
 
 pytestmark = pytest.mark.tui
 
@@ -41,7 +41,7 @@ async def test_open_see_why_not_search_and_talk_are_three_keys(
     async def transport(connection: Any, *_: Any, **given: Any) -> Any:
         return TunedPipe(floor, "b", connection.baud or given.get("baud") or 9600, False)
 
-    monkeypatch.setattr(opening, "_transport", transport)
+    lead_to(monkeypatch, transport)
     monkeypatch.setattr(scanning, "WINDOW", 0.002)
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state", data=tmp_path / "data")
     session = Session(settings, reconnect=True)
@@ -53,13 +53,14 @@ async def test_open_see_why_not_search_and_talk_are_three_keys(
             await until(pilot, lambda: "Enter alone begins it" in told(app))
             await until(pilot, lambda: app.screen is app.main and "? silent" in app.main.lines("top").plain)
             assert "search (about " in told(app) and "no drive replies" in told(app)
-            began, tops, top = session.now(), set[str](), app.presenter._top_row
+            began, tops = session.now(), set[str]()
 
-            def noted(screen: Any, now: float) -> Any:
-                tops.add("".join(text for text, _ in top(screen, now)))
-                return top(screen, now)
+            def noted(*given: Any) -> Any:
+                row = top_row(*given)
+                tops.add("".join(text for text, _ in row))
+                return row
 
-            monkeypatch.setattr(app.presenter, "_top_row", noted)
+            monkeypatch.setattr("multidrop.tui.presenter.top_row", noted)
             await pilot.press("enter")
             await until(pilot, lambda: isinstance(app.screen, GoOn) and app.screen.focused is not None)
             await settle(pilot)

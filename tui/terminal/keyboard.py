@@ -61,6 +61,11 @@ class Keyboard:
         return not self._waiting and not self._turning
 
     @property
+    def held(self) -> bool:
+        """Whether keys wait until their meaning is known."""
+        return bool(self._held)
+
+    @property
     def enter_waits(self) -> bool:
         return any(isinstance(event, events.Key) and event.key == "enter" for event in self._waiting)
 

@@ -2,15 +2,14 @@
 
 import pytest
 
-from multidrop.base import registry
-from multidrop.base.registry import FeatureEntry
 from multidrop.contract import Absent, FamilyContract, FamilySample, Moved, Read, Wrong
 from tests.support import knock
+from tests.support.own_features import load
 
 
 def listed(patch: pytest.MonkeyPatch) -> None:
     """List the family, as the entry point of an installed package does."""
-    patch.setattr(registry, "_others", {"p": (FeatureEntry("knock", "dist", "1", "p"), knock.FAMILY)})
+    load(patch, knock.FAMILY)
 
 
 class TestKnock(FamilyContract):

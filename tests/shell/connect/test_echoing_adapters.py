@@ -12,7 +12,6 @@ import pytest
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect import opening
 from multidrop.shell.events import Notified, OnBus, Printed
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
@@ -20,7 +19,7 @@ from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import RunningFloor
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, drive, party, pmx
-from tests.support.tuned_ports import TunedPipe
+from tests.support.tuned_ports import TunedPipe, lead_to
 
 pytestmark = pytest.mark.virtual
 FOLDERS = itertools.count()
@@ -63,7 +62,7 @@ class Place:
             self.pipe = pipe
             return pipe
 
-        patch.setattr(opening, "_transport", transport)
+        lead_to(patch, transport)
 
     async def run(self, url: str, *lines: str) -> None:
         try:

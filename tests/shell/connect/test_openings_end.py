@@ -9,10 +9,10 @@ import pytest
 
 from multidrop.base.errors import DriveError, TransportLost
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect import opening
 from multidrop.shell.session import Session
 from tests.support.cases import for_each
 from tests.support.talker import Talker
+from tests.support.tuned_ports import lead_to
 
 pytestmark = pytest.mark.virtual
 FOLDERS = itertools.count()
@@ -61,7 +61,7 @@ async def test_an_opening_and_the_first_line_end_within_one_limit(tmp_path, monk
     async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
         return Talker(says, every)
 
-    monkeypatch.setattr(opening, "_transport", transport)
+    lead_to(monkeypatch, transport)
     folder = tmp_path / str(next(FOLDERS))
     session: Any = Session(Settings({}, folder / "c", folder / "s", data=folder / "d"), lazy=lazy)
     began = session.now()

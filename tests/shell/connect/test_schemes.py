@@ -20,6 +20,7 @@ from multidrop.simulator import cells
 from multidrop.simulator.cell.endpoint_kinds import EndpointKind
 from multidrop.transports import NotOpen, Unreachable
 from multidrop.transports.serial_ports import PortInfo
+from tests.support.own_features import forget_loaded
 
 
 class Can(Scheme):
@@ -40,9 +41,7 @@ async def serve(floor: Any, bus: str, endpoint: Any, stack: Any) -> list[str]:
 
 def add(monkeypatch: pytest.MonkeyPatch, *adds: object) -> None:
     entry = registry.FeatureEntry("gateway", "elsewhere", "1", "elsewhere:FEATURE")
-    monkeypatch.setattr(registry, "_others", {entry.place: (entry, Feature("gateway", "a gateway", adds))})
-    monkeypatch.setattr(registry, "_failed", {})
-    monkeypatch.setattr(registry, "_untold", [])
+    forget_loaded(monkeypatch, (entry, Feature("gateway", "a gateway", adds)))
 
 
 @pytest.fixture

@@ -12,13 +12,13 @@ from multidrop.base.errors import DriveError
 from multidrop.dialects.families import seen
 from multidrop.dialects.state import Remembered
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect import opening
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.session import Session
 from multidrop.shell.state.port_state import PortState
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.talker import Talker
+from tests.support.tuned_ports import lead_to
 
 pytestmark = pytest.mark.virtual
 FOLDERS = itertools.count()
@@ -42,7 +42,7 @@ async def failure(folder: Any, patch: Any, url: str, lazy: bool, remembered: boo
     async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
         return Talker(network=connection.scheme.name == "tcp", **device)
 
-    patch.setattr(opening, "_transport", transport)
+    lead_to(patch, transport)
     folder = folder / str(next(FOLDERS))
     if remembered:
         kept = PortState(folder / "s", parse(url).port_name, 9600)
@@ -142,7 +142,7 @@ async def test_a_gateways_own_words_are_followed_by_no_other_cause(tmp_path, mon
     async def transport(connection: Any, port: str = "", within: Any = None, baud: Any = None) -> Any:
         return Gateway(number)
 
-    monkeypatch.setattr(opening, "_transport", transport)
+    lead_to(monkeypatch, transport)
     folder = tmp_path / str(next(FOLDERS))
     session: Any = Session(Settings({}, folder / "c", folder / "s", data=folder / "d"))
     with pytest.raises(DriveError, match=says) as caught:

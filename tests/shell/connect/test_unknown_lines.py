@@ -11,7 +11,6 @@ from multidrop.base.errors import NoAnswer
 from multidrop.dialects.families import FAMILIES, seen
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect import opening
 from multidrop.shell.events import By, Failed, Notified, Output
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
@@ -20,7 +19,7 @@ from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import Unreachable
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, party, pmx
-from tests.support.tuned_ports import TunedPipe
+from tests.support.tuned_ports import TunedPipe, lead_to
 
 pytestmark = pytest.mark.virtual
 PORT = "/dev/ttyUSB9"
@@ -42,7 +41,7 @@ class Desk:
         self.session.front = Front(self.ask, screen=self.screen)
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
-        monkeypatch.setattr(opening, "_transport", self.transport)
+        lead_to(monkeypatch, self.transport)
 
     async def ask(self, question: str) -> bool:
         self.asked.append(question)

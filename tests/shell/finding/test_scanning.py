@@ -15,7 +15,7 @@ from multidrop.shell.session import Session
 from multidrop.shell.state.port_state import PortState
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.talker import Talker
-from tests.support.tuned_ports import Port
+from tests.support.tuned_ports import Port, lead_to
 
 pytestmark = pytest.mark.virtual
 
@@ -385,7 +385,7 @@ async def test_a_search_among_endless_bytes_ends_and_says_what_came(tmp_path, mo
     async def transport(connection, port="", within=None, baud=None):
         return Talker(says, every)
 
-    monkeypatch.setattr(opening, "_transport", transport)
+    lead_to(monkeypatch, transport)
     session = Session(Settings({}, tmp_path / "c", tmp_path / "s", data=tmp_path / "d"))
     session.questions.agreed = True
     said = []
