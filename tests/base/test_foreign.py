@@ -107,7 +107,6 @@ def test_the_methods_of_an_object_catch_what_they_raise_themselves() -> None:
 def test_a_subscriber_that_fails_is_reported_once_without_a_traceback(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("multidrop.base.isolation._said", set())
     monkeypatch.setattr(LOG, "propagate", False)
     for _ in range(3):
         with isolated("a subscriber"):

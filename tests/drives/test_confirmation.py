@@ -79,6 +79,15 @@ class Confirmed(Stopping):
         self._tasks: dict[asyncio.Task[None], None] = {}
         self.again: list[tuple[str, ...]] = []
 
+    @property
+    def unconfirmed(self) -> list[Halt]:
+        return self._unconfirmed
+
+    def begin(self, halt: Halt) -> None:
+        """Begin to confirm a stop that was written."""
+        self._unconfirmed.append(halt)
+        self.resumed()
+
     def _repeat(self, halt: Halt) -> None:
         halt.started, halt.single = {}, False
         self.again.append(tuple(drive.shown for drive in halt.affected))
@@ -99,8 +108,7 @@ async def confirmed(*drives: Drive, link: Link, **more: Any) -> tuple[Confirmed,
     made = Confirmed(each)
     given: Any = drives
     halt = Halt(each, link.now() - 0.001, 1, True, given, data=b"\x1b", **more)
-    made._unconfirmed.append(halt)
-    made._begin_to_confirm(halt)
+    made.begin(halt)
     while made.tasks:
         await asyncio.wait(made.tasks)
     return made, halt
@@ -112,7 +120,7 @@ async def test_a_drive_that_is_read_at_rest_twice_is_reported_once_with_its_plac
     made, halt = await confirmed(a, b, link=link)
     assert link.told == [("a: stopped, velocity 0 at 7", False), ("b: stopped, velocity 0 at 1, 2", False)]
     assert [len(each.times) for each in (a, b)] == [2, 2] and a.times[1] - a.times[0] == pytest.approx(BETWEEN)
-    assert made._unconfirmed == [] and made.again == [] and not halt.vain and made.tasks == []
+    assert made.unconfirmed == [] and made.again == [] and not halt.vain and made.tasks == []
 
 
 async def test_without_a_known_drive_the_stop_is_sent_and_nothing_read():
@@ -191,7 +199,7 @@ async def test_a_drive_that_cannot_be_read_is_a_doubt_that_is_said_each_time_it_
     made, halt = await confirmed(a, link=link)
     assert link.told == [("a: stop sent, but its velocity could not be read: no reply", True)]
     assert list(halt.doubts.values()) == ["its velocity could not be read: no reply"]
-    assert made._unconfirmed == [] and len(a.times) == 1
+    assert made.unconfirmed == [] and len(a.times) == 1
 
 
 async def test_a_drive_that_is_started_again_is_left_to_its_operator():
@@ -199,7 +207,7 @@ async def test_a_drive_that_is_started_again_is_left_to_its_operator():
     a = Drive(link, "a", Activity(300))
     a.commanded_at = 1e9
     made, _ = await confirmed(a, link=link)
-    assert a.times == [] and link.told == [] and made._unconfirmed == []
+    assert a.times == [] and link.told == [] and made.unconfirmed == []
 
 
 async def test_while_its_line_may_still_be_refused_it_is_watched():
@@ -224,7 +232,9 @@ async def test_a_later_stop_of_the_whole_line_confirms_this_one():
     given: Any = (a,)
     halt = Halt(each, 0.0, 1, True, given, data=b"\x1b")
     made.last = halt
-    await made._read_drives(halt)
+    made.begin(halt)
+    while made.tasks:
+        await asyncio.wait(made.tasks)
     assert len(a.times) <= 3 and link.told == [("a: still moves at 300 a second; stop sent again", True)]
 
 
@@ -234,7 +244,7 @@ async def test_a_stop_that_a_loss_keeps_from_being_confirmed_stays_to_be_written
     a = Drive(link, "a", "its velocity could not be read: gone")
     link.lost = link.away = TransportLost("gone") if lost else None
     made, halt = await confirmed(a, link=link)
-    assert made._unconfirmed == ([halt] if lost else []) and made.again == []
+    assert made.unconfirmed == ([halt] if lost else []) and made.again == []
 
 
 async def test_on_a_lost_line_nothing_is_written_again():

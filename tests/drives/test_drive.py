@@ -96,7 +96,7 @@ async def test_a_line_that_the_loss_may_have_kept_back_has_not_started_the_drive
     shop, drive = await drive_a()
     sending = asyncio.ensure_future(drive.send("MR 100"))
     await asyncio.sleep(0)
-    shop.bus.link._broke(TransportLost("unplugged"))
+    shop.transport.unplugged()
     with pytest.raises(TransportLost):
         await sending
     assert drive.commanded_at == NEVER < drive.started_at
@@ -104,7 +104,8 @@ async def test_a_line_that_the_loss_may_have_kept_back_has_not_started_the_drive
 
 async def test_on_a_line_that_is_away_nothing_starts():
     shop, drive = await drive_a()
-    shop.bus.link._broke(TransportLost("unplugged"))
+    shop.transport.unplugged()
+    await asyncio.sleep(0)
     drive.starts_now()
     assert drive.started_at == NEVER
 
@@ -476,15 +477,10 @@ async def test_a_line_to_all_disturbs_the_places_of_every_drive():
     assert drive.state.unreferenced == {"x"} and shop.bus.drives["b"].state.unreferenced == frozenset()
 
 
-async def homing(drive: Drive, axis: str, text: str = "HM 1") -> list[str]:
+async def homing(shop: SimulatedBus, drive: Drive, axis: str, text: str = "HM 1") -> list[str]:
     """Send a homing; return the axes that are watched since."""
     watched: list[str] = []
-    drive._neighbours = SimpleNamespace(  # type: ignore[assignment]
-        all_drives=[drive],
-        homes=lambda drive, axis: watched.append(axis),
-        conversation_begins=lambda drive: False,
-        conversation_ended=lambda *given: None,
-    )
+    shop.bus.roster.homes = lambda drive, axis: watched.append(axis)  # type: ignore[method-assign]
     spoken(drive, referencing=lambda text: Referencing(axis, homing=True))
     await drive.send(text)
     return watched
@@ -492,10 +488,10 @@ async def homing(drive: Drive, axis: str, text: str = "HM 1") -> list[str]:
 
 async def test_a_homing_is_watched_where_its_axis_has_no_reference():
     shop, drive = await drive_a()
-    assert await homing(drive, "x") == []
+    assert await homing(shop, drive, "x") == []
     assert list(drive.homings) == ["x"]
     drive.state.reference_lost("y")
-    assert await homing(drive, "y") == ["y"]
+    assert await homing(shop, drive, "y") == ["y"]
 
 
 @pytest.mark.parametrize("well", [True, False])
@@ -510,7 +506,7 @@ async def test_the_end_of_a_homing_is_asked_once_and_gives_a_reference_if_it_end
         yield
 
     drive.state.reference_lost("xy")
-    await homing(drive, "x")
+    await homing(shop, drive, "x")
     otherwise(drive, homed=homed)
     assert await drive.homing_ended("x") is well
     assert await drive.homing_ended("x") is well
@@ -522,13 +518,13 @@ async def test_the_end_of_a_homing_is_asked_once_and_gives_a_reference_if_it_end
 async def test_what_was_sent_since_a_homing_has_ended_it_unless_it_was_the_homing_of_another_axis(between):
     shop, drive = await drive_a()
     drive.state.reference_lost("xy")
-    await homing(drive, "x")
+    await homing(shop, drive, "x")
     if between == "start":
         drive.starts_now()
     elif between == "stop":
         shop.bus.stop([drive])
     elif between == "another homing":
-        await homing(drive, "y")
+        await homing(shop, drive, "y")
     otherwise(drive, homed=lambda: returns(True))
     expected = between in ("another homing", "none")
     assert await drive.homing_ended("x") is expected
@@ -542,7 +538,7 @@ def returns(value: Any) -> Any:
 
 async def test_a_homing_that_begins_while_the_end_of_the_last_one_is_asked_has_not_ended():
     shop, drive = await drive_a()
-    await homing(drive, "x")
+    await homing(shop, drive, "x")
 
     def homed() -> Any:
         drive.homings["x"] = (99, 0.0, 0)

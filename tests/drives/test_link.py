@@ -313,7 +313,7 @@ async def test_a_persons_bytes_that_a_stop_kept_back_are_on_no_record():
 
 async def test_on_a_lost_line_a_persons_bytes_are_refused():
     desk = Desk()
-    desk.link._broke(TransportLost("gone"))
+    desk.pipe.lost(TransportLost("gone"))
     with pytest.raises(TransportLost, match="gone"):
         desk.link.write_raw(b"MR 1\r")
     assert desk.pipe.written == []

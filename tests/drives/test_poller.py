@@ -45,6 +45,7 @@ class Reads(Poller[str]):
         self.silent: list[str] = []
         self.refused: list[tuple[str, int, str]] = []
         self.interrupted = 0
+        self.due: dict[str, Due] = {}
         self.last: Any = None
 
     def _drive(self, thing: str) -> Any:
@@ -52,6 +53,7 @@ class Reads(Poller[str]):
 
     def _begin(self, thing: str, due: Due, drive: Any) -> None:
         self.asked.append((round(self.link.now() - self.begun, 4), thing))
+        self.due[thing] = due
 
         def start(over: Any) -> Any:
             failure = self.fails.get(thing)
@@ -173,7 +175,7 @@ async def test_naks_in_a_row_are_counted_until_a_reading():
     assert [count for _, count, _ in poller.refused] == [1, 2, 3]
     poller.last, poller.fails = transaction(End.DONE), {}
     await asyncio.sleep(0.1)
-    assert poller._due["a"].refusals == 0
+    assert poller.due["a"].refusals == 0
     poller.fails["a"] = Refused("other")
     await asyncio.sleep(12)
     assert poller.refused[3] == ("a", 0, "other")
@@ -184,7 +186,7 @@ async def test_a_thing_that_a_stop_kept_from_being_read_is_tried_again_soon_with
     poller.fails["a"] = Inexpressible("in program mode")
     poller.subscribe(["a"], 10.0)
     assert await poller.for_(0.07) == [(0.0, "a"), (0.06, "a")]
-    assert poller.silent == poller.refused == [] and poller._due["a"].silences == 0
+    assert poller.silent == poller.refused == [] and poller.due["a"].silences == 0
 
 
 async def test_after_a_loss_the_period_counts():
@@ -305,21 +307,24 @@ def motions(*names: str) -> tuple[_MotionPoller, ToldLink, Any]:
     return _MotionPoller(roster), link, roster
 
 
+def reply(roster: Any, at: float, *axes: Motion) -> None:
+    """The reply to the last poll of `a`."""
+    _, over = roster.at("a").asked[-1]
+    over(ConversationOutcome((axes,), None, None, transaction(End.DONE, at)))
+
+
 async def test_the_rate_of_samples_is_that_of_the_last_two_seconds():
-    poller, link, _ = motions("a")
+    poller, link, roster = motions("a")
     assert poller.rate("a") == 0.0
     poller.subscribe(["a"], 0.5)
     times = []
     for _ in range(4):
         await asyncio.sleep(0.5)
-        poller._took("a", link.now(), ())
+        reply(roster, link.now())
         times.append(poller.rate("a"))
     assert times == [0.0, 0.0, 2.0, 2.0]
     await asyncio.sleep(1.0)
     assert poller.rate("a") == 0.0
-    for _ in range(1100):
-        poller._took("a", link.now(), ())
-    assert len(poller._times["a"]) == 1000
 
 
 async def test_a_sample_has_what_was_read_and_the_velocity_that_the_places_show():
@@ -339,12 +344,14 @@ async def test_a_sample_has_what_was_read_and_the_velocity_that_the_places_show(
         Sample(3.0, "a", 6, 1, "y", "", None),
     ]
     roster.at("a").seen = None
-    poller._took("a", 4.0, axes[1:])
+    await asyncio.sleep(0.5)
+    reply(roster, 4.0, *axes[1:])
     subscription.close()
     await asyncio.sleep(0.01)
     assert len(link.events) == 2
     poller.subscribe(["a"], 0.5)
-    poller._took("a", 4.0, axes[1:])
+    await asyncio.sleep(0.5)
+    reply(roster, 4.0, *axes[1:])
     await asyncio.sleep(0.01)
     assert link.events[2:] == [Sample(4.0, "a", 6, 1, "y", "", None)]
 

@@ -1,6 +1,7 @@
 """The drives of a link: restarts of some and of others with them, homings, the list, the search and its limits."""
 
 import asyncio
+import math
 from contextlib import suppress
 from dataclasses import replace
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from multidrop.dialects import Hints, Motion, Owed
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.events import Restarted
 from multidrop.drives.motion_record import MotionRecord
+from multidrop.drives.port_journal import Keeper
 from multidrop.drives.roster import RETRY_PAUSE, Restarts, Roster, _compare, _shown, _text
 from multidrop.drives.roster import _ran_on as ran_on
 from multidrop.families.lexium.host.mcode.codec import MCode
@@ -534,7 +536,7 @@ async def test_a_sign_on_is_reported_once_and_is_certainly_that_of_a_drive_that_
     shop, roster = await roster_of(*names)
     lines = sign_on(roster)
     assert lines
-    roster._unsolicited(("a print", *lines))
+    roster.link.on_unsolicited(("a print", *lines))
     assert [each for each in shop.told if "(sign-on)" in each] == [text]
     assert [each.certain for each in shop.events if isinstance(each, Restarted)] == [certain] * len(names)
     assert [drive.motions.restarts for drive in roster.all_drives] == [int(certain)] * len(names)
@@ -544,7 +546,7 @@ async def test_a_sign_on_is_reported_once_and_is_certainly_that_of_a_drive_that_
 
 async def test_a_print_is_no_sign_on():
     shop, roster = await roster_of("a")
-    roster._unsolicited(("a print",))
+    roster.link.on_unsolicited(("a print",))
     assert not any(isinstance(each, Restarted) for each in shop.events)
 
 
@@ -566,8 +568,15 @@ async def test_a_print_is_no_sign_on():
 )
 async def test_a_search_has_a_limit_for_itself_its_places_and_its_repairs(baud, timeout, probing, hints, limit):
     roster = SimulatedBus(party("a"), baud=baud, timeout=timeout).bus.roster
-    roster.probing = probing
-    assert roster._limit(hints) == limit
+
+    async def never(*_: Any, **named: Any) -> Any:
+        await asyncio.sleep(math.inf)
+
+    roster.conversations.run = never  # type: ignore[method-assign]
+    begun = asyncio.get_running_loop().time()
+    with pytest.raises(NoAnswer, match=f"no drive could be identified within {limit:.0f} s"):
+        await roster.search(replace(hints, drives=probing))
+    assert asyncio.get_running_loop().time() - begun == pytest.approx(limit)
 
 
 async def searched(roster: Roster, hints: Hints, *found: Any) -> list[Hints]:
@@ -626,9 +635,14 @@ async def test_a_drive_without_a_name_is_looked_for_without_one():
 
 
 async def test_what_is_to_be_remembered_goes_to_the_keeper():
-    shop, roster = await roster_of("a")
     kept: list[Any] = []
-    roster._keeper = SimpleNamespace(remember=kept.append)  # type: ignore[assignment]
+
+    class Kept(Keeper):
+        def remember(self, drives: Any) -> None:
+            kept.append(drives)
+
+    shop, roster = await roster_of("a", keeper=Kept())
+    kept.clear()
     roster.remember()
     assert kept == [{"a": roster.drives["a"].family.remember()}]
     roster.drives = {}

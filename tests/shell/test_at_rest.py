@@ -44,13 +44,13 @@ class Moving:
 
         class Own(FAMILIES[family]):  # type: ignore[misc]
             def motion(self, priority: Priority) -> Iterator[Any]:
-                return mover._motion(self.state, priority)
+                return mover.motion(self.state, priority)
 
             def moving(self) -> Iterator[Any]:
-                return mover._moving(self.state)
+                return mover.moving(self.state)
 
             def busy(self) -> Iterator[Any]:
-                return mover._busy(self.state)
+                return mover.busy(self.state)
 
             @property
             def motions(self) -> Motions:
@@ -66,15 +66,15 @@ class Moving:
             raise NoAnswer("a does not reply")
         return SPEED if asyncio.get_running_loop().time() < ENDS and self.read not in self.false else 0
 
-    def _motion(self, state: Any, priority: Priority) -> Iterator[Any]:
+    def motion(self, state: Any, priority: Priority) -> Iterator[Any]:
         yield replace(state.codec.request(state.address, "PR V"), priority=priority)
         return (Motion(int(SPEED * min(asyncio.get_running_loop().time(), ENDS)), self._velocity()),)
 
-    def _moving(self, state: Any) -> Iterator[Any]:
+    def moving(self, state: Any) -> Iterator[Any]:
         yield state.codec.request(state.address, "PR MV")
         return self._velocity() != 0
 
-    def _busy(self, state: Any) -> Iterator[Any]:
+    def busy(self, state: Any) -> Iterator[Any]:
         yield state.codec.request(state.address, "PR BY")
         return False
 

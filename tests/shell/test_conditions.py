@@ -10,7 +10,7 @@ import pytest
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import UNREAD, Conditions
-from multidrop.drives.events import Conditioned, Unsolicited
+from multidrop.drives.events import Conditioned, Traffic, Unsolicited
 from multidrop.families.lexium.host.motions import cause
 from multidrop.families.lexium.manual.points import CAUSE
 from multidrop.shell.events import OnBus
@@ -54,14 +54,12 @@ class Watched(CellSession):
 async def test_conditions_that_nobody_wants_any_more_as_their_reading_begins_are_not_read(tmp_path):
     async with Watched(tmp_path, party("a"), "a") as cell:
         await asyncio.sleep(2)
-        telemetry = cell.session.buses["line"].telemetry
-        begin = telemetry._conditions._begin
 
-        def begun(*given: Any) -> None:
-            begin(*given)
-            cell.watch.close()
+        def begun(event: Any) -> None:
+            if isinstance(event, OnBus) and isinstance(event.event, Traffic) and event.event.outgoing:
+                cell.watch.close()
 
-        telemetry._conditions._begin = begun
+        cell.session.subscribe(begun)
         before = len(read(cell))
         await asyncio.sleep(5)
         assert len(read(cell)) <= before + 1

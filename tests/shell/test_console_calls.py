@@ -38,6 +38,11 @@ class Call:
         return self._does(*given)
 
 
+def behind(pointer: Any) -> Any:
+    """What a pointer of ctypes points to."""
+    return pointer._obj
+
+
 def number(handle: Any) -> int:
     return int(getattr(handle, "value", handle))
 
@@ -71,7 +76,7 @@ class Kernel:
     def GetConsoleMode(self, handle: Any, mode: Any) -> int:
         if number(handle) not in self.modes:
             return 0
-        mode._obj.value = self.modes[number(handle)]
+        behind(mode).value = self.modes[number(handle)]
         return 1
 
     def SetConsoleMode(self, handle: Any, mode: int) -> int:
@@ -113,7 +118,7 @@ class Kernel:
                 names = ("pressed", "repeats", "code", "scan", "character", "held")
                 for name, value in zip(names, key, strict=True):
                     setattr(place.key, name, value)
-        count._obj.value = len(given)
+        behind(count).value = len(given)
         return 1
 
     def SetConsoleCtrlHandler(self, handler: Any, add: bool) -> None:
@@ -286,7 +291,7 @@ def test_a_console_that_is_closed_interrupts_the_process_and_waits_for_it(
 ) -> None:
     sent: list[int] = []
     waits: list[float] = []
-    monkeypatch.setattr(windows.module._thread, "interrupt_main", sent.append)
+    monkeypatch.setattr("_thread.interrupt_main", sent.append)
     monkeypatch.setattr(threading.Event, "wait", lambda _, time=None: waits.append(time))
     action = (lambda *_: None) if handled else signal.SIG_DFL
     monkeypatch.setattr(signal, "getsignal", lambda number: action if number == signal.SIGUSR2 else None)

@@ -14,7 +14,6 @@ import pytest
 from multidrop.base.errors import DriveError, MotionFailed, NoAnswer, Refused, TransportLost
 from multidrop.dialects import Procedure
 from multidrop.dialects.motions import Ending
-from multidrop.shell import motions
 from multidrop.shell.events import Failed, Notified, Output
 from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import WrongScript, read_script
@@ -171,8 +170,7 @@ async def test_a_motion_whose_end_cannot_be_read_is_a_failure(
 
     async with on(tmp_path) as session:
         own: Any = session.drive().family.motions
-        own.judge = unread
-        monkeypatch.setattr(motions, "_motions", lambda drive: own)
+        monkeypatch.setattr(type(own), "judge", unread)
         failure = await failed(session, "MR 100", "/wait stopped", "R1=777")
         assert (failure.outcome, failure.reason) == ("unknown", f"its end could not be read ({error})")
         assert await value(session, "R1") == 0
@@ -188,8 +186,7 @@ async def test_a_line_keeps_its_outcome_where_the_end_of_a_motion_before_it_cann
 
     async with at_limit(tmp_path) as session:
         own: Any = session.drive().family.motions
-        own.judge = unread
-        monkeypatch.setattr(motions, "_motions", lambda drive: own)
+        monkeypatch.setattr(type(own), "judge", unread)
         failure = await failed(session, "MA 90000", "/sleep 5", "R1=777")
         assert failure.outcome == "unknown"
         assert str(failure).startswith(

@@ -88,7 +88,9 @@ def test_history_urls_drafts_marks_and_the_list_of_logs(tmp_path: Path, kind: st
     files.note(Settings(state=state), tmp_path / "my.jsonl")
     assert files.newest(Settings(state=state)) == tmp_path / "my.jsonl"
     drafts = Drafts(state)
-    victims.append(in_place(kind, state / "drafts" / drafts._name("go.mxt")))
+    Drafts(tmp_path / "own").keep(Copy("go.mxt", "MR 1", "now"))
+    [own] = (tmp_path / "own" / "drafts").iterdir()
+    victims.append(in_place(kind, state / "drafts" / own.name))
     assert drafts.find("go.mxt") is None
     drafts.keep(Copy("go.mxt", "MR 1", "now"))
     assert drafts.find("go.mxt") == Copy("go.mxt", "MR 1", "now")

@@ -75,7 +75,8 @@ class Plant:
             self._watch(name, line.link.transport)
 
     def _watch(self, name: str, transport: Any) -> None:
-        left, write = self.left.setdefault(name, []), transport._endpoint.write
+        endpoint = transport._endpoint
+        left, write = self.left.setdefault(name, []), endpoint.write
 
         def noted(data: bytes | memoryview) -> int:
             at = time.monotonic()  # before the call, behind which this thread may wait for its turn
@@ -83,7 +84,7 @@ class Plant:
             left.append((at, bytes(data[:taken])))
             return taken
 
-        transport._endpoint.write = noted
+        endpoint.write = noted
 
     def moving(self) -> list[str]:
         now, found = self.floor.now(), list[str]()

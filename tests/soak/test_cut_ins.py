@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 from random import Random
+from typing import Any
 
 import pytest
 
@@ -52,10 +53,23 @@ class Endpoint:
 
 
 @pytest.fixture
-def cut_ins() -> Iterator[CutIns]:
-    made = CutIns(lambda name: None)
+def passed() -> list[str]:
+    """The names of the points that were hit."""
+    return []
+
+
+@pytest.fixture
+def cut_ins(passed: list[str]) -> Iterator[CutIns]:
+    made = CutIns(passed.append)
     yield made
     made.kill()
+
+
+def guarded(endpoint: Any, cut_ins: CutIns) -> DescriptorPipe:
+    """A pipe in whose critical sections others may cut in."""
+    pipe = DescriptorPipe(endpoint)
+    pipe._guard = cut_ins.lock()  # type: ignore[assignment]
+    return pipe
 
 
 @pytest.mark.virtual
@@ -63,8 +77,7 @@ def cut_ins() -> Iterator[CutIns]:
 @pytest.mark.parametrize("further", range(0, 40, 5))
 async def test_a_stop_cuts_in_at_a_point_and_waits_for_the_lock(cut_ins: CutIns, point: str, further: int) -> None:
     endpoint = Endpoint()
-    pipe = DescriptorPipe(endpoint)  # type: ignore[arg-type]
-    pipe._guard = cut_ins.lock()  # type: ignore[assignment]
+    pipe = guarded(endpoint, cut_ins)
     cut_ins.begin(Aim(point, 1, further), partial(pipe.preempt, False, lambda dropped: b"\x1b"))
     pipe.write(b"MR 1\r")
     pipe.write(b"MR 2\r")
@@ -74,17 +87,17 @@ async def test_a_stop_cuts_in_at_a_point_and_waits_for_the_lock(cut_ins: CutIns,
 
 @pytest.mark.virtual
 @pytest.mark.parametrize("own", range(1, 80, 3))
-async def test_the_thread_of_a_stop_is_held_up_anywhere_and_nothing_leaves_after_it(cut_ins: CutIns, own: int) -> None:
-    endpoint, held = Endpoint(), list[str]()
-    pipe = DescriptorPipe(endpoint)  # type: ignore[arg-type]
-    pipe._guard = cut_ins.lock()  # type: ignore[assignment]
-    cut_ins._passed = held.append
+async def test_the_thread_of_a_stop_is_held_up_anywhere_and_nothing_leaves_after_it(
+    cut_ins: CutIns, passed: list[str], own: int
+) -> None:
+    endpoint = Endpoint()
+    pipe = guarded(endpoint, cut_ins)
     point = next(each for each in points() if each.startswith("pipe DescriptorPipe.write"))
     cut_ins.begin(Aim(point, 1, 0, own, 10_000), partial(pipe.preempt, False, lambda dropped: b"\x1b"))
     for number in range(3):
         pipe.write(b"MR %d\r" % number)
     cut_ins.hurry()
-    assert UP in held or own > 60
+    assert UP in passed or own > 60
     assert endpoint.taken.count(b"\x1b") == 1
     assert endpoint.taken[-1] == b"\x1b"
     pipe.yielded()

@@ -30,6 +30,9 @@ class Client:
         self._to.feed_data(b"".join((begin, *written)))
         self.task = asyncio.create_task(serving._run(Server("LMDCM", 0.0), self._to, self._from.feed_data))
 
+    def write(self, data: bytes) -> None:
+        self._to.feed_data(data)
+
     async def read(self) -> dict[str, Any]:
         async with asyncio.timeout(PATIENCE):
             size = re.fullmatch(rb"Content-Length: (\d+)\r\n", await self._from.readline())

@@ -178,13 +178,16 @@ def pytest_collection_finish() -> None:
 
 def _watch_apps(app: Any) -> None:
     """Refuse to run a Textual app in a test without the marker `tui`."""
-    run = app._process_messages
+    for name in ("run_async", "run_test"):
+        setattr(app, name, _demanding(getattr(app, name)))
 
-    async def watched(*arguments: Any, **named: Any) -> None:
+
+def _demanding(run: Callable[..., Any]) -> Callable[..., Any]:
+    def watched(*arguments: Any, **named: Any) -> Any:
         _demand("tui", "runs the app")
-        await run(*arguments, **named)
+        return run(*arguments, **named)
 
-    app._process_messages = watched
+    return watched
 
 
 def _keep_parsed(sheet: Any) -> None:

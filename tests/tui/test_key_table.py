@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from textual import events
+from textual import actions, events
 from textual.pilot import Pilot
 
 from multidrop.base.files import rows
@@ -80,7 +80,8 @@ def noticed(app: MultidropApp, key: str) -> bool:
     found = binding_of(app, key)
     if found is None:
         return False
-    target, name, _ = app._parse_action(found[0].action, found[1])
+    place, name, _ = actions.parse(found[0].action)
+    target = app if place == "app" else getattr(app, place) if place else found[1]
     return hasattr(target, f"action_{name}") or hasattr(target, f"_action_{name}")
 
 

@@ -553,9 +553,10 @@ async def test_a_file_of_settings_is_read_again_before_its_values_are_used(folde
         assert isinstance(page, ParametersPage)
 
         def shows(text: str) -> bool:
-            return text in "\n".join(page.lines(part).plain for part in ("columns", "rows"))
+            return text in "\n".join(page.lines(part).plain for part in ("columns", "table"))
 
-        await until(pilot, lambda: shows(" VM "))
+        await until(pilot, lambda: app.model.bus("eth").readout("").settings is not None)
+        page.edited("VM")
         page.action_ask("file")
         page.typed(str(file))
         await until(pilot, lambda: shows("p.toml") and shows("100"))

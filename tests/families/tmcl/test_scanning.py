@@ -127,8 +127,7 @@ async def test_what_cannot_be_read_is_said_once_for_all_addresses(tmp_path):
 
 async def test_half_a_message_of_another_host_hides_no_module(tmp_path):
     port = Port(tmp_path, line(*LINE))
-    for device in port.floor.floor.wires["b"]._ports:
-        device.receive(frame_of(1, TmclCall(1, 0, 0, 500))[:5], 0.0)
+    port.floor.floor.wires["b"].receive(frame_of(1, TmclCall(1, 0, 0, 500))[:5], 0.0)
     found, search = scanning(port)
     await search.run([9600], True)
     assert [each["address"] for each in found] == list(LINE)

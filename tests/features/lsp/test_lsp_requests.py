@@ -65,7 +65,7 @@ async def test_one_letter_that_is_inserted_is_one_more_in_the_text() -> None:
     (begun,) = await client.replies(1)
     assert begun["result"]["capabilities"]["textDocumentSync"]["change"] == types.TextDocumentSyncKind.Incremental
     assert len((await client.read())["params"]["diagnostics"]) == 550
-    client._to.feed_data(message(method="textDocument/didChange", params=changed))
+    client.write(message(method="textDocument/didChange", params=changed))
     after = (await client.read())["params"]
     assert (after["version"], len(after["diagnostics"])) == (2, 550)
     assert after["diagnostics"][0]["range"] == {

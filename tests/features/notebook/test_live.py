@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -89,8 +90,10 @@ def test_a_picture_ends_with_its_session(session: Session, kernel: Kernel, monke
     monkeypatch.setattr(live_pictures, "EVERY", 0.01)
     live = session.live()
     session.close()
-    live._thread.join(10)
-    assert not live._thread.is_alive()
+    threads = [each for each in threading.enumerate() if each.name == "multidrop live"]
+    for each in threads:
+        each.join(10)
+    assert live is not None and not any(each.is_alive() for each in threads)
 
 
 def test_outside_a_notebook_it_is_refused_in_one_line(url: str) -> None:

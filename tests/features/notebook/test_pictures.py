@@ -50,8 +50,11 @@ def _points(line: ElementTree.Element) -> str:
 def test_a_long_curve_is_thinned_and_keeps_its_peak() -> None:
     values = [0.0] * 100_000
     values[70_001] = 5.0
-    times, kept = pictures._thinned([float(each) for each in range(len(values))], values)
-    assert len(kept) <= pictures.POINTS and max(kept) == 5.0 and times == sorted(times)
+    [svg] = drawn(pictures.plot("position", [("a", [float(each) for each in range(len(values))], values)]))
+    [line] = [each for each in svg.iter() if _points(each)]
+    points = [tuple(map(float, each.split(","))) for each in _points(line).split()]
+    assert len(points) <= pictures.POINTS and points == sorted(points, key=lambda point: point[0])
+    assert len({y for _, y in points}) == 2, "the peak is drawn"
 
 
 @pytest.mark.virtual

@@ -41,6 +41,7 @@ class Shared:
         calls = GateCalls(
             self._ahead, self.stops.append, self._joined, self.behind.append, self._left, self.refused.append
         )
+        self.calls = calls
         self.gate = Gate(folder, asyncio.get_running_loop(), calls)
 
     def _ahead(self) -> None:
@@ -135,7 +136,7 @@ async def test_the_loop_stops_where_the_thread_of_a_watcher_cannot_and_its_later
     def defective() -> None:
         raise ZeroDivisionError
 
-    object.__setattr__(shared.gate._calls, "stop_ahead", defective)
+    object.__setattr__(shared.calls, "stop_ahead", defective)
     peer = plain(shared, greeting())
     await until(lambda: shared.gate.watchers)
     peer.sendall(b"\x18")

@@ -25,6 +25,7 @@ from multidrop.features.sharing.writer_turns import NOT_REACHED, WRITES_A_TURN, 
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.transports import Unreachable, telnet
+from multidrop.transports.pipe import DescriptorPipe
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.telnet import OPTION, Setting, message
 from tests.support.posix import termios, tty
@@ -50,11 +51,11 @@ class Line:
         os.set_blocking(self.far, False)
         self.link.unlink(missing_ok=True)
         self.link.symlink_to(os.ttyname(near))
-        self._near = near
+        self.near = near
 
     def close(self) -> None:
         os.close(self.far)
-        os.close(self._near)
+        os.close(self.near)
 
     async def got(self, data: bytes) -> bytes:
         """Wait for bytes at the far end; return all that came."""
@@ -222,7 +223,7 @@ async def test_a_lost_port_closes_its_clients_and_comes_back(shared: Shared) -> 
 
 async def test_a_port_that_cannot_be_found_again_ends_it(tmp_path: Path) -> None:
     line = Line(tmp_path / "tty")
-    port = SharedPort(await open_port(parse(os.ttyname(line._near))), stop_bytes(""), lambda said: None)
+    port = SharedPort(await open_port(parse(os.ttyname(line.near))), stop_bytes(""), lambda said: None)
     await port.open("127.0.0.1", 0)
     line.close()
     loss = await asyncio.wait_for(port.lost_for_good, PATIENCE)
@@ -245,11 +246,11 @@ async def test_a_stop_takes_back_what_is_unsent_but_no_stop_that_is_still_leavin
 ) -> None:
     taken_back = list[bool]()
 
-    def discard(whole: bool = False) -> int:
+    def discard(pipe: object, whole: bool = False) -> int:
         taken_back.append(whole)
         return 0
 
-    monkeypatch.setattr(shared.port._transport, "discard", discard)
+    monkeypatch.setattr(DescriptorPipe, "discard", discard)
     _, ada = await shared.client()
     _, bob = await shared.client()
     ada.write(b"PR P\r")

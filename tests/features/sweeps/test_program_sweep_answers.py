@@ -370,15 +370,15 @@ def test_many_values_come_as_stretches(sweep: Sweep) -> None:
 def test_nothing_else_writes_the_files(sweep: Sweep, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file appears by one replacement: a reader never sees a part of a row."""
     seen: list[int] = []
-    replace = atomic._replace
+    replace = os.replace
 
     def watched(new: Path, old: Path) -> None:
-        if old.name == "all.csv":
+        if Path(old).name == "all.csv":
             assert new.read_bytes().endswith(b"\n")
             seen.append(new.read_bytes().count(b"\n"))
         replace(new, old)
 
-    monkeypatch.setattr(atomic, "_replace", watched)
+    monkeypatch.setattr(os, "replace", watched)
     monkeypatch.setattr(results, "LEAST_WRITE_PERIOD", 0.0)
     monkeypatch.setattr(results, "SHARE", 0)
     sweep(*GRID, "--csv", "all.csv")
@@ -402,8 +402,9 @@ def test_the_motor_is_varied_and_a_margin_leaves_out_what_an_error_ended(sweep: 
 def test_no_cell_of_a_table_is_a_formula_and_each_is_read_again(kept: Any, why: str) -> None:
     folder, made, _ = kept
     table = results.ResultTable(made)
-    cells = (why,) * (len(table._columns[table._kept]))
-    margins = [name.startswith(results.MARGIN) for name in table._columns[table._kept]]
+    columns = table._columns[table._kept]
+    cells = (why,) * len(columns)
+    margins = [name.startswith(results.MARGIN) for name in columns]
     cells = tuple("" if margin else cell for cell, margin in zip(cells, margins, strict=True))
     path = folder / "formula.csv"
     path.unlink(missing_ok=True)

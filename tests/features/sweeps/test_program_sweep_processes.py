@@ -167,21 +167,22 @@ def test_a_cluster_of_which_a_part_hangs_is_lost_after_a_time_that_is_named(
     monkeypatch.setattr(workers, "WORKER_TIMEOUT", 2.0)
     monkeypatch.setattr(workers, "CHECK_PERIOD", 0.2)
     monkeypatch.setattr(workers, "SCHEDULER_TIMEOUT", 1.0)
-    wait = workers._Work._wait
+    work = workers._Work
+    wait = work._wait
     stopped: list[str] = []
 
     with cluster(folder, "dask_cluster.py", "1") as address:
         hanging = found("-f", str(folder / "address"))
         hanging = found("-P", hanging[0]) if who == "workers" else hanging
 
-        def struck(self: workers._Work, done: object) -> None:
+        def struck(self: object, done: object) -> None:
             if not stopped:
                 stopped.extend(hanging)
                 for each in hanging:
                     os.kill(int(each), signal.SIGSTOP)
             wait(self, done)
 
-        monkeypatch.setattr(workers._Work, "_wait", struck)
+        monkeypatch.setattr(work, "_wait", struck)
         lost = multidrop("program", "sweep", "go.mxt", *WALLS, "--yes", "--cluster", address, "--csv", "some.csv")
         for each in stopped:
             os.kill(int(each), signal.SIGCONT)

@@ -29,6 +29,10 @@ def dying(*_: object) -> Iterator[Dying]:
     yield Dying()
 
 
+work_of: Any = workers._Work
+"""The chunks of a sweep on a cluster."""
+
+
 def test_a_scheduler_that_ends_in_the_middle_of_a_question_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is done was yielded before, and is reported."""
 
@@ -111,10 +115,15 @@ def test_a_cluster_that_gives_no_result_is_lost_after_a_time(
     monkeypatch.setattr("distributed.as_completed", client)
     monkeypatch.setattr(workers, "time", SimpleNamespace(monotonic=lambda: client.now))
     with Interruption() as interruption:
-        work = workers._Work(client, TrialJob("", "", "", "", "", (), ()), "tcp://h:1", interruption)
+        work = work_of(client, TrialJob("", "", "", "", "", (), ()), "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match=f"^tcp://h:1: {what}$"):
             list(work.results([[(1, ())], [(2, ())]]))
     assert seconds <= client.now < seconds + 3 * workers.CHECK_PERIOD and client.cancelled == 2
+
+
+def result_of(work: Any, future: Any, cases: list[Case]) -> list[TrialResult]:
+    """What a reply of the cluster is taken for."""
+    return work._result(future, cases)  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(
@@ -135,15 +144,15 @@ def test_a_reply_that_is_no_result_ends_the_sweep(found: object) -> None:
     future = SimpleNamespace(status="finished", result=lambda timeout: found)
     with Interruption() as interruption:
         job = TrialJob("", "", "", "", "", (), ())
-        work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)
+        work = work_of(SimpleNamespace(), job, "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match="^tcp://h:1: a worker replied with something else than results$"):
-            work._result(future, [(1, ()), (2, ())])
+            result_of(work, future, [(1, ()), (2, ())])
 
 
 def test_an_exception_of_a_worker_is_one_line() -> None:
     future = SimpleNamespace(status="error", exception=lambda timeout: ImportError("no module x"))
     with Interruption() as interruption:
         job = TrialJob("", "", "", "", "", (), ())
-        work = workers._Work(SimpleNamespace(), job, "tcp://h:1", interruption)
+        work = work_of(SimpleNamespace(), job, "tcp://h:1", interruption)
         with pytest.raises(TransportLost, match="^tcp://h:1: a worker failed: ImportError: no module x$"):
-            work._result(future, [(1, ())])
+            result_of(work, future, [(1, ())])

@@ -267,6 +267,11 @@ async def test_a_transfer_is_cancelled_once_and_one_that_has_ended_or_has_just_e
     desk.carrier.close()
 
 
+def watching() -> list[threading.Thread]:
+    """The threads that wait for what a device sends."""
+    return [each for each in threading.enumerate() if each.name.endswith(" events")]
+
+
 async def test_after_the_end_nothing_begins_and_nothing_is_reported(bus: Bus) -> None:
     desk = Desk()
     desk.carrier.receive()
@@ -274,9 +279,9 @@ async def test_after_the_end_nothing_begins_and_nothing_is_reported(bus: Bus) ->
     with pytest.raises(TransferFailed) as failure:
         desk.carrier.send(b"x")
     assert failure.value.args == TransferFailed(interface.GONE).args
+    [thread] = watching()
     desk.carrier.close()
-    thread = desk.carrier._thread
-    assert thread is not None and thread.daemon and not thread.is_alive()
+    assert thread.daemon and not thread.is_alive()
     await asyncio.sleep(0)
     assert desk.done == desk.broken == [] and bus.submitted[0].cancelled >= 1
 
@@ -287,10 +292,7 @@ async def test_a_bus_that_breaks_is_reported_once_and_an_interruption_is_none(bu
     bus.breaks = [USBErrorInterrupted(4), USBError(value)]
     await until(lambda: bool(desk.broken))
     assert [each and each.args for each in desk.broken] == [TransferFailed(end).args]
-    thread = desk.carrier._thread
-    assert thread is not None
-    thread.join(PATIENCE)
-    assert not thread.is_alive()
+    await until(lambda: not watching())
     desk.carrier.close()
 
 

@@ -207,7 +207,7 @@ async def test_what_is_printed_later_than_a_greeting_is_a_drives_output(tmp_path
     place = Place(tmp_path, monkeypatch, cell, repeats=False, lazy=True, greeting=b"Welcome\r\n", network=True)
     await place.session.open(url)
     await asyncio.sleep(3.0)
-    place.floor.loop.call_soon(place.pipe._received, b"12345\r\n")
+    place.floor.loop.call_soon(place.pipe.hear, b"12345\r\n")
     await asyncio.sleep(0.3)
     await place.session.run("PR P")
     await place.session.close()
@@ -224,9 +224,9 @@ async def test_questions_that_come_back_late_and_together_are_no_output(tmp_path
     await place.session.open(url)
     await place.session.run("PR P")
     await place.session.run("PR VM")
-    place.floor.loop.call_soon(place.pipe._received, b'PR P,"~"\rPR VM,"~"\r\n')
+    place.floor.loop.call_soon(place.pipe.hear, b'PR P,"~"\rPR VM,"~"\r\n')
     await asyncio.sleep(0.3)
-    place.floor.loop.call_soon(place.pipe._received, b"PR P\r\n")  # the trace of a program
+    place.floor.loop.call_soon(place.pipe.hear, b"PR P\r\n")  # the trace of a program
     await asyncio.sleep(0.3)
     await place.session.close()
     place.floor.close()
@@ -239,7 +239,7 @@ async def test_what_another_host_does_on_the_line_is_said_and_no_drives_output(t
     place = Place(tmp_path, monkeypatch, cell, repeats=False)
     await place.session.open(url)
     for _ in range(20):
-        place.floor.loop.call_soon(place.pipe._received, b"@07PX\r1234\r" * 9)
+        place.floor.loop.call_soon(place.pipe.hear, b"@07PX\r1234\r" * 9)
         await asyncio.sleep(0.3)
     await place.run(url)
     assert place.output == []

@@ -2,6 +2,7 @@
 
 import asyncio
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -134,7 +135,8 @@ async def test_a_stop_while_others_are_being_opened_reaches_the_open_ones(tmp_pa
 
 async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_first_to_be_sent_there(tmp_path):
     cell = CellSession(tmp_path, bus("press", party("a", ES=1), party("b", ES=3)))
-    real = cell.session.openings._opener
+    openings: Any = cell.session.openings
+    real = openings._opener
 
     async def slow(connection, naming):
         await asyncio.sleep(5.0)
@@ -143,7 +145,7 @@ async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_f
             placed.device.execute("SL 5000", opened[0].floor.now())
         return opened
 
-    cell.session.openings._opener = slow
+    openings._opener = slow
     opening = asyncio.create_task(cell.session.open(cell.url))
     await asyncio.sleep(1.0)
     cell.session.stop("Ctrl+X")

@@ -104,7 +104,7 @@ async def test_a_power_cycle_is_listened_to_and_nothing_is_sent_meanwhile(tmp_pa
         await asyncio.sleep(5.0)
         device.power(True, port.floor.now())
         port.floor.floor.wires["b"].look_again()
-        port.floor._turn()
+        port.floor.write("b", b"")
 
     async def ask(question):
         if "listen" in question:

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import os
+import struct
 import threading
 
 import pytest
 
 from multidrop.shell.prompt.keyboard import Keyboard
-from multidrop.shell.prompt.raw_terminal import _waiting as waiting
 from multidrop.shell.prompt.terminal_input import TYPING_PAUSE, at_keyboard
-from tests.support.posix import pty, termios
+from tests.support.posix import fcntl, pty, termios
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.pty
+
+
+def waiting(terminal):
+    """The bytes that nobody has read."""
+    return struct.unpack("i", fcntl.ioctl(terminal, termios.FIONREAD, bytes(4)))[0]
 
 
 class Typed:

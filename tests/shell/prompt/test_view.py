@@ -68,6 +68,10 @@ class Above(LinesAbove):
             assert keep
             self.kept += data
 
+    def end(self):
+        """Write what is left, as at the end of the program."""
+        self._write_rest()
+
     def __init__(self):
         super().__init__(self.App())
         self._writer = self.Writer()
@@ -138,7 +142,7 @@ async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
     above.add(["STILL MOVING"], keep=True)
     above.add(["x" * 62] * 5000, keep=False)
     above.add(["STOPPED"], keep=True)
-    above._write_rest()
+    above.end()
     lines = above.writer.kept.decode().splitlines()
     missing = f"{5000 - (len(lines) - 3)} lines are missing here: the terminal did not take them"
     assert (lines[:3], lines[-1]) == (["STILL MOVING", missing, "x" * 62], "STOPPED")

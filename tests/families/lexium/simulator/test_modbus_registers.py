@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
@@ -282,11 +283,12 @@ def test_values_wider_than_their_registers():
     assert drive.get("D5") == 255
     drive.mcode("CE=2")
     assert drive.get("CE") == 2 and drive.put("CE", 2) == ILLEGAL_VALUE
+    registers: Any = drive.port._registers
     for status, low in ((256, 0), (257, 1), (511, 255)):
-        drive.port._registers.number = lambda word, now, status=status: status
+        registers.number = lambda word, now, status=status: status
         assert drive.get("AF") == low
     for faults, any_of_them in ((0, 0), (1, 1), (2, 1), (3, 1)):
-        drive.port._registers.number = lambda word, now, faults=faults: faults
+        registers.number = lambda word, now, faults=faults: faults
         assert drive.get("OF") == any_of_them
 
 
