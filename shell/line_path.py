@@ -111,7 +111,12 @@ class LinePath:
     async def starting(
         self, origin: Origin, drive: Drive, text: str = "", *, parts: bool = False
     ) -> AsyncIterator[None]:
-        """Send in the body a line, or what can start anything in a drive. `parts`: it is several requests."""
+        """Record what is sent to a drive in the body of this context, and that it may start motion or a program.
+
+        `text`: the line that is sent; without it, what is sent may start anything. `parts`: it is sent as several
+        requests, so after a refusal some may have been executed. Raises Unreferenced, Diagnostic or Stopped before
+        anything is sent, where it must not start the drive, and what the body raises.
+        """
         if text and not drive.starts(text):
             async with sending(self._automations, origin, drive, text, starts=False, parts=parts):
                 yield

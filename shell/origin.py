@@ -26,7 +26,7 @@ class LastLine:
 class Origin:
     """Who enters a line and to what it belongs. By default a person at the session.
 
-    The lines of a script or macro have that of the line that runs it, but for what is replaced.
+    A line of a script or macro has the origin of the line that runs the script or macro, with some fields replaced.
     """
 
     by: By = By.OPERATOR

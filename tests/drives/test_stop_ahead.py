@@ -22,10 +22,10 @@ class Desk:
         self.owed: list[StopPiece] = []
         transport = SimpleNamespace(preempt=self._preempt, follow=self._follow, preemptible=preemptible)
         self.line: Any = SimpleNamespace(
-            only_stop=False,
+            last_write_was_stop=False,
             stops_all=True,
             byte_time=0.0,
-            transmitted=5.0,
+            transmitted_at=5.0,
             owed_pieces=lambda: [*self.owed],
             half_sent=lambda now: False,
         )
@@ -60,7 +60,7 @@ def test_the_first_key_begins_a_stop_and_the_next_one_goes_on_with_it(desk: Desk
 
 
 def test_a_key_goes_on_with_a_stop_of_the_loop_or_begins_a_new_one_once_that_is_over(desk: Desk) -> None:
-    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
     desk.ahead.press()
     assert desk.calls == [("follow", True), ("after", pytest.approx(0.2))]
     desk.calls.clear()
@@ -70,7 +70,7 @@ def test_a_key_goes_on_with_a_stop_of_the_loop_or_begins_a_new_one_once_that_is_
 
 
 def test_a_key_begins_a_stop_behind_one_of_some_drives_and_in_its_own_order(desk: Desk) -> None:
-    desk.line.only_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), *FORMS.repeats]
+    desk.line.last_write_was_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), *FORMS.repeats]
     desk.ahead.press()
     assert desk.calls == [("preempt", True, b"STOP"), ("after", pytest.approx(0.3))]
     assert desk.ahead._begun is not None and desk.ahead._begun.pieces == [*FORMS.repeats]
@@ -79,8 +79,12 @@ def test_a_key_begins_a_stop_behind_one_of_some_drives_and_in_its_own_order(desk
 @pytest.mark.parametrize(("left", "first"), [(4.9, b"STOP"), (5.1, b"ST~STOP")])
 def test_so_it_does_where_a_thread_has_gone_on_with_that_one(desk: Desk, left: float, first: bytes) -> None:
     """What is still leaving of it may be cut off."""
-    desk.line.only_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)]
-    desk.line.transmitted = 4.8
+    desk.line.last_write_was_stop, desk.line.stops_all, desk.owed = (
+        True,
+        False,
+        [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)],
+    )
+    desk.line.transmitted_at = 4.8
     desk.ahead.watch(FORMS)
     assert desk.ahead._take_back(0) == b"y" and desk.ahead._begun is not None
     desk.ahead._begun.left = left
@@ -94,29 +98,29 @@ def test_so_it_does_where_a_thread_has_gone_on_with_that_one(desk: Desk, left: f
 
 
 def test_a_piece_that_is_due_and_does_not_leave_is_tried_again_soon(desk: Desk) -> None:
-    desk.line.only_stop, desk.line.transmitted, desk.owed = True, 4.8, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.line.transmitted_at, desk.owed = True, 4.8, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
     assert desk.calls == [("after", RETRY_AFTER)]
 
 
-@pytest.mark.parametrize(("only_stop", "owed"), [(False, True), (True, False)])
+@pytest.mark.parametrize(("last_write_was_stop", "owed"), [(False, True), (True, False)])
 def test_nothing_is_looked_at_where_the_loop_has_written_all_or_something_else(
-    desk: Desk, only_stop: bool, owed: bool
+    desk: Desk, last_write_was_stop: bool, owed: bool
 ) -> None:
-    desk.line.only_stop, desk.owed = only_stop, [StopPiece(b"y", 0.2)] if owed else []
+    desk.line.last_write_was_stop, desk.owed = last_write_was_stop, [StopPiece(b"y", 0.2)] if owed else []
     desk.ahead.watch(FORMS)
     assert desk.calls == []
 
 
 def test_nor_on_a_transport_that_no_other_thread_may_write_to(monkeypatch: pytest.MonkeyPatch) -> None:
     desk = Desk(monkeypatch, preemptible=False)
-    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
     assert desk.calls == []
 
 
 def test_the_loop_is_asked_for_a_sign_of_life_before_its_stop_is_taken_from_it(desk: Desk) -> None:
-    desk.line.only_stop, desk.owed, desk.follows = True, [StopPiece(b"y", 0.2)], False
+    desk.line.last_write_was_stop, desk.owed, desk.follows = True, [StopPiece(b"y", 0.2)], False
     desk.ahead.watch(FORMS)
     desk.calls.clear()
     desk.ahead._go_on()
@@ -145,10 +149,10 @@ def test_the_next_piece_is_written_once_it_is_due_and_nothing_waits(desk: Desk) 
 def test_a_piece_is_taken_back_from_a_loop_that_is_held_up(desk: Desk) -> None:
     ahead = desk.ahead
     assert ahead._take_back(0) is None
-    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)]
+    desk.line.last_write_was_stop, desk.owed = True, [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)]
     ahead.watch(FORMS)
     assert ahead._take_back(0) is None and not hasattr(desk.line, "overtaken")
-    desk.line.transmitted = 4.8
+    desk.line.transmitted_at = 4.8
     assert ahead._take_back(0) == b"y" and desk.line.overtaken
     begun = ahead._begun
     assert begun is not None and begun.pieces == [StopPiece(b"z", 0.2)] and begun.written == [(5.0, b"y")]
@@ -156,7 +160,7 @@ def test_a_piece_is_taken_back_from_a_loop_that_is_held_up(desk: Desk) -> None:
 
 
 def test_where_bytes_wait_the_stop_is_taken_back_and_nothing_written(desk: Desk) -> None:
-    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
     assert desk.ahead._take_back(3) == b"" and desk.line.overtaken
     assert desk.ahead._begun is not None and desk.ahead._begun.written == []
@@ -193,7 +197,7 @@ def test_a_key_that_goes_on_with_a_stop_keeps_all_of_its_own_pieces_and_none_tha
         return True
 
     desk.ahead._link.transport.follow = follow  # type: ignore[method-assign]
-    desk.line.only_stop, desk.line.transmitted = True, 4.0
+    desk.line.last_write_was_stop, desk.line.transmitted_at = True, 4.0
     desk.owed = [StopPiece(b"gone", 0.2)]
     desk.ahead.press()
     first, *others = FORMS.pieces

@@ -162,7 +162,7 @@ class Dressed(App[int]):
     """An app with our themes, and with the signs that the font of its terminal holds."""
 
     ENABLE_COMMAND_PALETTE = False
-    """Textual's own palette; ours is a `Search`, in which keys keep their order."""
+    """Textual's own palette; ours is a `SearchDialog`, in which keys keep their order."""
 
     def __init__(self, look: ScreenSettings, driver: type[Driver] | None = None) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.

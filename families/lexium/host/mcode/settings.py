@@ -53,7 +53,7 @@ from multidrop.families.lexium.manual.table import words
 
 ETHERNET = ("LMDOE", "LMDCE")
 """The products without a name."""
-BETWEEN = ":"
+VALUE_SEPARATOR = ":"
 """Printed between two settings; no setting contains it."""
 NOT_PRINTED = "the drive refuses the line in which it is asked (PR ER shows why), or prints another form"
 USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re.I)
@@ -112,8 +112,8 @@ def items_and_forms(batch: Sequence[Mnemonic]) -> tuple[str, list[str]]:
     for before, row in zip([None, *batch], batch, strict=False):
         form = form_of(row)
         alone = before is None or (form_of(before) is SettingForm.DIGIT and form is SettingForm.DIGIT)
-        items += ("" if before is None else "," if alone else f',"{BETWEEN}",') + row.name
-        forms.append(f"{'' if alone else BETWEEN}{form.value}")
+        items += ("" if before is None else "," if alone else f',"{VALUE_SEPARATOR}",') + row.name
+        forms.append(f"{'' if alone else VALUE_SEPARATOR}{form.value}")
     return items, forms
 
 
@@ -127,7 +127,7 @@ def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[lis
             note_error(state, reply)
             match = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
             assert match is not None
-            return [group.removeprefix(BETWEEN).strip() for group in match.groups()]
+            return [group.removeprefix(VALUE_SEPARATOR).strip() for group in match.groups()]
         if reply.end is End.REFUSED and not reply.doubtful:
             state.error_flag_read(True)
             return None

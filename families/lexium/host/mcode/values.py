@@ -33,7 +33,7 @@ from multidrop.families.lexium.host.mcode.exchange import (
     value,
 )
 from multidrop.families.lexium.host.mcode.settings import (
-    BETWEEN,
+    VALUE_SEPARATOR,
     MCodeParameters,
     items_and_forms,
     list_request,
@@ -182,7 +182,7 @@ class MCodeValues(LexiumValues):
         assert match is not None
         facts: dict[str, Value] = {}
         for row, text in zip(batch, match.groups(), strict=True):
-            fields = tuple(int(number) for number in text.removeprefix(BETWEEN).split(","))
+            fields = tuple(int(number) for number in text.removeprefix(VALUE_SEPARATOR).split(","))
             facts[row.name] = fields if form_of(row) is SettingForm.FIELDS else fields[0]
         return facts
 
