@@ -112,15 +112,15 @@ class Doubt:
         if _outstanding(request, reply, doubtful):
             cut = reply.end in (End.DAMAGED, End.STOPPED) and heard != b"" and not heard.endswith(TERMINATORS)
             late = _Late(now + LATE_WITHIN, request, nak=reply.end is End.NAK, begun=cut)
-            # A drive replies in order: the replies to its earlier requests may come as long as the one to this.
+            # A drive replies in order: replies to its earlier requests may come for as long as the one to this request.
             own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]
             self._late = [*others, *own, late]
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:
-        """Return a reply; that to a mark with all lines since the doubtful reply that the mark checks.
+        """Return the reply. Before that to a mark, add all lines since the doubtful reply that the mark checks.
 
-        Lines that came before another drive's mark are among them: one may be the true reply of this drive.
+        They include lines before another drive's mark: one of these may be the true reply of this drive.
         """
         evidence = self._evidence.pop(request.address, None)
         if request.gather or reply.doubtful:  # a doubtful reply may be the true one to an earlier request

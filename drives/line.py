@@ -77,8 +77,8 @@ class Flight:
         patience, own = self.request.codec.quiet_time(self.request, buffer), self.request.timeout
         slow = default - DEFAULT_TIMEOUT
         if slow > 0 and own is not None and self.request.signed:
-            # A line with a longer timeout is slow, so this request gets as much more time than its own. That holds for
-            # its quiet time, too, until the print has come that bears its signature.
+            # The request has a timeout of its own. On a line with a longer one than usual it gets that much more time.
+            # So does its quiet time, until the print that bears its signature has come.
             own += slow
             if not re.search(self.request.expect or "", buffer.decode("latin-1")):
                 patience += slow
@@ -206,9 +206,9 @@ class Line:
         self.inbox.receive(data, now)
 
     def note_written(self, data: bytes, now: float, whole: bool = False, codec: Codec | None = None) -> None:
-        """Note bytes that are written: a request of `codec`, a piece of a stop, or bytes past the queue (None).
+        """Note bytes that are written. `codec`: that of a request; None: they are a stop, or go past the queue.
 
-        `whole`: a drive that receives only the first part of them may do harm; see `half_sent`.
+        `whole`: a drive that receives only the beginning of them may do harm; see `half_sent`.
         """
         self.transmitted_at = now + len(data) * self.byte_time
         self._partial_until = self.transmitted_at if whole else float("-inf")

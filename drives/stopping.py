@@ -81,8 +81,8 @@ class Stopping:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
 
         `started`: what was started in each of `only`; only that is stopped, where the line allows it.
-        `follows`: it takes over what `ahead` has begun, if anything. False for a stop that no key has asked for: then a
-        later call takes that over. Failures go to `Halt.trouble`.
+        `follows`: a stop of all drives takes over what `ahead` has begun, if anything; with False it leaves that to the
+        next one. Failures go to `Halt.trouble`.
         """
         drives = tuple(self._roster.all_drives if only is None else only)
         halt = Halt(self._link, self._link.stamp(), self._link.stops, only is None, drives)
