@@ -188,7 +188,7 @@ class Codec(ABC):
     """One drive's language as that drive is set: bytes out, replies in, and the stop."""
 
     family: ClassVar[str]
-    """The name of its record in `families.FAMILIES`."""
+    """The name of its record in `dialects.families.FAMILIES`."""
     framed: ClassVar[bool] = False
     """Messages carry their length, so neither direction of the stream may be cut within a message."""
     numbered: ClassVar[bool] = False

@@ -142,7 +142,7 @@ class Bus:
         """Go on with the line, although no drive has replied."""
         self.silent = why
         self.link.resumed()
-        self._stopping.unasked()
+        self._stopping.count_as_done()
         self.telemetry.resume()
         self.link.publish(Changed(self.now()))
 
@@ -172,7 +172,7 @@ class Bus:
         """
         if self.link.reserved and not release:
             self.link.resumed()
-            self._stopping.unasked()
+            self._stopping.count_as_done()
             self.link.publish(Changed(self.now()))
             return
         if ends := [conversation.over for conversation in self._conversations.under_way]:

@@ -21,7 +21,7 @@ class LocalEcho:
         self.held = b""
         """Bytes received while the repetition is incomplete."""
 
-    def wrote(self, data: bytes) -> bytes:
+    def note_written(self, data: bytes) -> bytes:
         """Wait for these bytes from now on; return what was held for the write before."""
         held, self.own, self.held = self.held, data, b""
         return held
@@ -39,7 +39,7 @@ class LocalEcho:
         return before, after
 
     def forget(self) -> bytes:
-        return self.wrote(b"")
+        return self.note_written(b"")
 
 
 WATCHED = 24
@@ -59,7 +59,7 @@ class EchoWatch:
         self._codec: Codec | None = None
         self._sent = self._heard = b""
 
-    def wrote(self, data: bytes, codec: Codec | None) -> None:
+    def note_written(self, data: bytes, codec: Codec | None) -> None:
         """Look for these bytes from now on. `codec`: that of a request; None: they are not looked for."""
         self._left -= codec is not None
         self._codec = codec if self._left >= 0 else None
@@ -99,7 +99,7 @@ class FirstBytes:
         if not self.answered:
             self.came = (self.came + data)[:MOST_HEARD]
 
-    def wrote(self, data: bytes) -> None:
+    def note_written(self, data: bytes) -> None:
         if not self.answered and len(self._written) < MOST_HEARD:
             self._written.append(data)
 

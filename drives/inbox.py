@@ -112,17 +112,18 @@ class Doubt:
         if _outstanding(request, reply, doubtful):
             cut = reply.end in (End.DAMAGED, End.STOPPED) and heard != b"" and not heard.endswith(TERMINATORS)
             late = _Late(now + LATE_WITHIN, request, nak=reply.end is End.NAK, begun=cut)
-            own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]  # none before the first
+            # A drive replies in order: replies to its earlier requests may come for as long as the one to this request.
+            own = [replace(each, until=late.until, nak=late.nak, taken=False) for each in own]
             self._late = [*others, *own, late]
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:
-        """A mark with all lines that came since the doubtful reply for which it was printed.
+        """Return the reply. Before that to a mark, add all lines since the doubtful reply that the mark checks.
 
-        What came before the mark of another drive may be the reply that this one owes.
+        They include lines before another drive's mark: one of these may be the true reply of this drive.
         """
         evidence = self._evidence.pop(request.address, None)
-        if request.gather or reply.doubtful:  # or the reply that an earlier doubtful one stands for
+        if request.gather or reply.doubtful:  # a doubtful reply may be the true one to an earlier request
             self.stray(reply.lines)
         if evidence and request.gather and reply.end is End.DONE:
             return replace(reply, lines=(*evidence, *reply.lines))
@@ -150,8 +151,8 @@ def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:
     return doubtful or reply.end is End.SILENT
 
 
-LASTS = 0.5
-"""How long after the last byte of a stop its debris may come, s."""
+DEBRIS_LASTS = 0.5
+"""Time after the last byte of a stop during which its debris may come, s."""
 GARBLED = re.compile(r"[^\t -~]")
 """Two drives that replied at once; a print has no such characters unless it wants them."""
 SCRAP = re.compile(r'[-\w]{0,2}["!~]+[-\w ]{0,2}"?')
@@ -175,10 +176,10 @@ class Debris:
         self._sent = self._sent + text if now <= self._until else text
         self._asked = request
 
-    def stop_written(self, data: bytes, transmitted: float) -> None:
-        """Note a stop; of a repeated one no bytes. `transmitted`: when its last byte has left."""
+    def stop_written(self, data: bytes, transmitted_at: float) -> None:
+        """Note a stop; `data` is empty for a repeated one. `transmitted_at`: when its last byte is sent, s."""
         self._sent += data.decode("latin-1")
-        self._until = transmitted + LASTS
+        self._until = transmitted_at + DEBRIS_LASTS
 
     def may_come(self, now: float) -> bool:
         """Whether bytes may still be those that a stop leaves."""
@@ -279,8 +280,8 @@ CERTAINLY_OVER = 0.018
 """The silence, s, after which no line feed of a drive follows the CR that it repeats; adapters hold bytes for 16 ms."""
 TAIL = 0.05
 """Quiet time after which no more of an unterminated line is awaited, s."""
-NEVER_QUIET = 1.0
-"""Longest wait for a quiet wire, s: a program may print without a pause, and a stop must be repeated."""
+LONGEST_WAIT_FOR_QUIET = 1.0
+"""Longest wait for a quiet wire, s: a program may print without a pause, and a stop must be repeated even then."""
 
 
 class Inbox:
@@ -342,12 +343,12 @@ class Inbox:
 
     # Local echo
 
-    def wrote(self, data: bytes, now: float, codec: Codec | None = None) -> None:
+    def note_written(self, data: bytes, now: float, codec: Codec | None = None) -> None:
         """Expect the repetition of these bytes, if the adapter repeats them. `codec`: that of their request."""
         if self.echo:
-            self._publish_rest(self.echo.wrote(data), now)
+            self._publish_rest(self.echo.note_written(data), now)
         else:
-            self.watch.wrote(data, codec)
+            self.watch.note_written(data, codec)
 
     def notice_echo(self, data: bytes, now: float, over: bool = False) -> None:
         """Remove our own bytes from now on, once it is certain that the adapter repeats them. `over`: as in it."""
@@ -443,4 +444,4 @@ class Inbox:
         if self.codec.numbered or not (self.buffer or held):
             return None
         quiet = self.received_at + TAIL
-        return quiet if held else min(quiet, self._begun_at + NEVER_QUIET)
+        return quiet if held else min(quiet, self._begun_at + LONGEST_WAIT_FOR_QUIET)

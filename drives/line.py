@@ -26,7 +26,7 @@ from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Reque
 from multidrop.dialects.codec import copy_with
 from multidrop.drives.echoes import LocalEcho
 from multidrop.drives.events import Transaction, Unsolicited
-from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox
+from multidrop.drives.inbox import LONGEST_WAIT_FOR_QUIET, TAIL, Doubt, Inbox
 
 DEFAULT_TIMEOUT = 1.0
 """Longest wait for a reply after the last byte, s, unless a URL gives `timeout`."""
@@ -77,7 +77,8 @@ class Flight:
         patience, own = self.request.codec.quiet_time(self.request, buffer), self.request.timeout
         slow = default - DEFAULT_TIMEOUT
         if slow > 0 and own is not None and self.request.signed:
-            # It ends by itself: a line with a longer timeout gives it that much, until its own print has come.
+            # The request has a timeout of its own. On a line with a longer one than usual it gets that much more time.
+            # So does its quiet time, until the print that bears its signature has come.
             own += slow
             if not re.search(self.request.expect or "", buffer.decode("latin-1")):
                 patience += slow
@@ -85,11 +86,11 @@ class Flight:
         quiet = since + patience
         if self.request.kind is Kind.COMMAND:
             # A command prints nothing, so a program that prints without a pause does not delay it.
-            quiet = min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
+            quiet = min(quiet, self.transmitted_at + max(2 * patience, LONGEST_WAIT_FOR_QUIET))
         timeout = max(default if own is None else own, patience)
         longest = self.transmitted_at + (LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout)
         if not buffer.endswith(b"\n"):  # not in the middle of a program's line
-            longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
+            longest = max(longest, min(self.received_at + TAIL, longest + LONGEST_WAIT_FOR_QUIET))
         self.due = quiet, min(since + timeout, longest)
         return self.due
 
@@ -104,8 +105,8 @@ class QueuedRequest(NamedTuple):
 
 RECOVERY_QUIET = 0.1
 """Quiet time after which a recovering line is written to again, s."""
-HELD_UP = 4
-"""Quiet times for which further stops hold up a piece of the first one."""
+MOST_HELD_UP_QUIETS = 4
+"""Longest time for which further stops hold up a piece of the first one, in quiet times of that piece."""
 
 
 class Write(NamedTuple):
@@ -143,8 +144,8 @@ class Line:
     ) -> None:
         self.timeout = timeout
         self.inbox = Inbox(codec, local_echo, self._publish, lambda: self._events.append(EchoFound()))
-        self.transmitted = float("-inf")
-        """Time at which the last byte written has left, calculated from the baud rate, s."""
+        self.transmitted_at = float("-inf")
+        """Time at which the last byte written has been sent on the wire, calculated from the baud rate, s."""
         self.baud = baud
         """The baud rate of the port; 0 where it is not known."""
         self.byte_time = 10.0 / baud if baud else 0.0
@@ -166,8 +167,8 @@ class Line:
         self._offered: tuple[StopPiece, int] | None = None
         """The piece that the last Write carries, and the number of stops then, until the transport has accepted it."""
         self._stops = 0
-        self.only_stop = False
-        """What was written last is a stop or a piece of one: no part of anything else can be on the wire behind it."""
+        self.last_write_was_stop = False
+        """What was written last is a stop or a piece of one, so nothing else can be on the wire behind it."""
         self.stops_all = False
         """The last stop is for the whole line. One for some drives holds up none that is."""
         self._partial_until = float("-inf")
@@ -204,19 +205,19 @@ class Line:
             self.unasked += 1
         self.inbox.receive(data, now)
 
-    def wrote(self, data: bytes, now: float, whole: bool = False, codec: Codec | None = None) -> None:
-        """Note bytes that were written past the queue: a stop. `whole`: a part of them would do harm in a drive.
+    def note_written(self, data: bytes, now: float, whole: bool = False, codec: Codec | None = None) -> None:
+        """Note bytes that are written. `codec`: that of a request; None: they are a stop, or go past the queue.
 
-        `codec`: they are a request of this codec.
+        `whole`: a drive that receives only the beginning of them may do harm; see `half_sent`.
         """
-        self.transmitted = now + len(data) * self.byte_time
-        self._partial_until = self.transmitted if whole else float("-inf")
-        self.inbox.wrote(data, now, codec)
+        self.transmitted_at = now + len(data) * self.byte_time
+        self._partial_until = self.transmitted_at if whole else float("-inf")
+        self.inbox.note_written(data, now, codec)
 
     def not_written(self, now: float) -> None:
         """Note that the transport dropped the last Write: no drive receives any of it."""
         self._partial_until = float("-inf")
-        self.inbox.wrote(b"", now)
+        self.inbox.note_written(b"", now)
         if isinstance(self._state, Flight):
             self._state.sent = False
         self.put_back()
@@ -255,12 +256,12 @@ class Line:
         """Fail what is queued (for `only` these addresses) and in flight; write each of `repeats` once it is quiet.
 
         Pieces of the last stop that are not written yet go first, so that each drive has its turn. `since`: another
-        thread has begun the stop, and written to it up to then, as for `went_on`.
+        thread has begun this stop and wrote its last piece at that time; `repeats` is what is left, as for `went_on`.
         """
         if only is None and not self.stops_all:
             self._repeats = []  # those of some drives: they are in this stop, in its own order
-        self.stops_all = only is None or (self.stops_all and self.only_stop and self.stopping)
-        self.overtaken, self.only_stop = False, True
+        self.stops_all = only is None or (self.stops_all and self.last_write_was_stop and self.stopping)
+        self.overtaken, self.last_write_was_stop = False, True
         self._stops += 1
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
@@ -284,7 +285,10 @@ class Line:
         self._state = Recovering(now, held_up)
 
     def went_on(self, repeats: Sequence[StopPiece], since: float) -> None:
-        """Note that another thread has gone on with the last stop, up to then: `repeats` is left of it."""
+        """Note that another thread has gone on with the last stop; `repeats` is what it has left to write.
+
+        `since`: the time of its last write.
+        """
         self.overtaken = False
         self._repeats, self._state = [*repeats], Recovering(since)
 
@@ -302,7 +306,7 @@ class Line:
         self.inbox.cut_off(now)
         self._queue = []
         self._repeats = []
-        self._offered, self.only_stop = None, False
+        self._offered, self.last_write_was_stop = None, False
         self._partial_until = float("inf") if begun else float("-inf")
         self._state = Recovering(now)
         return flight
@@ -347,7 +351,7 @@ class Line:
             piece = self._repeats.pop(0)
             self._offered = piece, self._stops
             self._state = Recovering(now)
-            self.wrote(piece.data, now, whole=not self.stops_all)
+            self.note_written(piece.data, now, whole=not self.stops_all)
             self._events.append(Write(piece.data, None))
             return False
         if self.inbox.awaits_tail(now):
@@ -366,9 +370,9 @@ class Line:
         self._poll_passed_over = poll_waits and priority is not Priority.POLL
         request = copy_with(request, tag=ticket)
         data = request.codec.encode(request)
-        self.only_stop = False
-        self.wrote(data, now, whole=True, codec=request.codec)
-        self._state = Flight(ticket, request, now, self.transmitted, now)
+        self.last_write_was_stop = False
+        self.note_written(data, now, whole=True, codec=request.codec)
+        self._state = Flight(ticket, request, now, self.transmitted_at, now)
         self._events.append(Write(data, request))
 
     def _finish(self, flight: Flight, found: Decoded, now: float) -> None:
@@ -452,13 +456,13 @@ class Line:
 
     def _quiet_at(self, trouble: Recovering) -> float:
         """Time at which the wire has been quiet long enough, or is given up on."""
-        since = max(self.transmitted, trouble.since)
+        since = max(self.transmitted_at, trouble.since)
         quiet = self._repeats[0].quiet if self._repeats else RECOVERY_QUIET
-        quiet_at = min(max(self.inbox.received_at, since) + quiet, since + NEVER_QUIET)
+        quiet_at = min(max(self.inbox.received_at, since) + quiet, since + LONGEST_WAIT_FOR_QUIET)
         if not self._repeats:
             return max(quiet_at, self.inbox.tail_at() or quiet_at)  # not in the middle of a program's line
         # A stop key that is held down must not keep the stop from the drives that get it piece by piece.
-        return min(quiet_at, max(self.transmitted, trouble.held_up_since + HELD_UP * quiet))
+        return min(quiet_at, max(self.transmitted_at, trouble.held_up_since + MOST_HELD_UP_QUIETS * quiet))
 
 
 LONG_QUIET = 0.5

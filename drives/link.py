@@ -26,7 +26,7 @@ OnAnswer = Callable[[events.Transaction | TransportLost], None]
 """Called with the end of a request that was queued, in the turn of the event loop in which it ends."""
 
 
-HELD_UP = 0.01
+LATE_TIMER = 0.01
 """A timer that is later than this, s, was held up with the loop: what the wire has delivered meanwhile comes first."""
 ECHO = "the adapter repeats what it sends: our own bytes are removed for this session, as with echo=local"
 UNASKED = 10.0
@@ -176,7 +176,7 @@ class Link:
         """
         if loss := self.loss:
             raise loss
-        now, self.line.only_stop = self.now(), False
+        now, self.line.last_write_was_stop = self.now(), False
         if not self.transport.write(data):
             return False
         text = data.decode("latin-1")
@@ -186,9 +186,9 @@ class Link:
                 self.departure.arrived()
 
         self.departure.begins(text)
-        self.line.wrote(data, now, whole=True)
+        self.line.note_written(data, now, whole=True)
         if data.endswith(TERMINATORS):
-            self._loop.call_at(self.line.transmitted, left)
+            self._loop.call_at(self.line.transmitted_at, left)
         self.publish(events.Traffic(now, True, data))
         self.advance()
         return True
@@ -257,7 +257,7 @@ class Link:
 
     def _wake(self, due: float) -> None:
         self._timer = None
-        if self.now() - due > HELD_UP:  # a pipe delivers in the next turn
+        if self.now() - due > LATE_TIMER:  # a pipe delivers in the next turn
             self._loop.call_soon(self.advance)
         else:
             self.advance()
@@ -280,9 +280,9 @@ class Link:
             self.line.not_written(now)
             return
         self.line.accepted()
-        self.heard.wrote(data)
+        self.heard.note_written(data)
         if request is None:
-            self.debris.stop_written(b"", self.line.transmitted)
+            self.debris.stop_written(b"", self.line.transmitted_at)
             self.publish(events.Traffic(now, True, data, stop=True))
             return
         # A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
@@ -387,11 +387,11 @@ class Link:
         """Write the rest of a stop, up to its repetition after a pause, and close the port. Call `shut` first."""
         self._sleep()
         for piece in divided(self._rest)[0]:
-            due = self.line.transmitted + piece.quiet + len(piece.data) * self.line.byte_time
+            due = self.line.transmitted_at + piece.quiet + len(piece.data) * self.line.byte_time
             await asyncio.sleep(max(0.0, due - self.now()))
             with isolated(f"the stop of {self.name}"):
                 self.transport.write(piece.data)
-                self.line.wrote(piece.data, self.now())
+                self.line.note_written(piece.data, self.now())
         await self.transport.close()
         if self._orderly:
             self.departure.arrived()

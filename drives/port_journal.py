@@ -12,7 +12,7 @@ GLOBAL = ("*", "^")
 
 
 class Keeper:
-    """Keeps nothing, as for a port that needs no record; `shell.connect.port_state` keeps one. No method raises."""
+    """Keeps nothing, as for a port that needs no record; `shell.state.port_state` keeps one. No method raises."""
 
     baud = 0
     """The baud rate of the port; 0 where it has none."""

@@ -68,7 +68,8 @@ class BegunStop:
         """Whether some drives have not had their turn yet."""
         return bool(self.pieces) and self.pieces[0].quiet <= LONG_QUIET
 
-    def wrote(self, data: bytes, now: float, byte_time: float) -> bytes:
+    def note_written(self, data: bytes, now: float, byte_time: float) -> bytes:
+        """Note a write of the stop; return its bytes."""
         self.left = now + len(data) * byte_time
         self.written.append((now, data))
         return data
@@ -101,7 +102,7 @@ class StopAhead:
     def _on_its_way(self) -> bool:
         """Whether a stop of the whole line is on its way."""
         begun, line = self._begun, self._link.line
-        return begun.stops_all if begun is not None else line.only_stop and line.stops_all
+        return begun.stops_all if begun is not None else line.last_write_was_stop and line.stops_all
 
     def _begin(self, forms: StopForms, dropped: int) -> bytes:
         """The first bytes of a stop. `dropped`: how many unsent ones made room for it."""
@@ -116,7 +117,7 @@ class StopAhead:
         written = last.written if last is not None else []
         self._begun = begun = BegunStop(forms, data, now, pieces, written, invalidates, before)
         line.overtaken = True
-        return begun.wrote(data, now, line.byte_time)
+        return begun.note_written(data, now, line.byte_time)
 
     def _again(self, forms: StopForms, waiting: int) -> bytes | None:
         """The next piece of a stop that is on its way; empty if it is not due; None: none is on its way.
@@ -127,14 +128,14 @@ class StopAhead:
             return None
         line, begun = self._link.line, self._begun
         if begun is None:
-            begun = BegunStop(forms, forms.immediate, line.transmitted, line.owed_pieces())
+            begun = BegunStop(forms, forms.immediate, line.transmitted_at, line.owed_pieces())
         now = self._link.now()
         free = not waiting and now >= begun.clear(line.byte_time)
         if free and not begun.goes_on():
             return None
         begun.forms, begun.pieces = forms, merged(begun.pieces, forms.pieces)
         self._begun, line.overtaken = begun, True
-        return begun.wrote(begun.pieces.pop(0).data, now, line.byte_time) if free else b""
+        return begun.note_written(begun.pieces.pop(0).data, now, line.byte_time) if free else b""
 
     def _pace(self) -> None:
         """Look at the next piece at its time."""
@@ -146,9 +147,9 @@ class StopAhead:
     def _of_the_loop(self) -> BegunStop | None:
         """The stop of which the loop has still to write pieces; None: it has written all, or something else since."""
         line = self._link.line
-        if self._last is None or not line.only_stop or not (pieces := line.owed_pieces()):
+        if self._last is None or not line.last_write_was_stop or not (pieces := line.owed_pieces()):
             return None
-        return BegunStop(self._last, self._last.immediate, line.transmitted, pieces, stops_all=line.stops_all)
+        return BegunStop(self._last, self._last.immediate, line.transmitted_at, pieces, stops_all=line.stops_all)
 
     def _go_on(self) -> None:
         """Write the next piece if the loop does not."""
@@ -186,7 +187,7 @@ class StopAhead:
         byte_time, now = self._link.line.byte_time, self._link.now()
         if waiting or now < begun.due(byte_time):
             return b""
-        return begun.wrote(begun.pieces.pop(0).data, now, byte_time)
+        return begun.note_written(begun.pieces.pop(0).data, now, byte_time)
 
     # In the loop
 

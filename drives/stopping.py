@@ -30,10 +30,10 @@ from multidrop.drives.stop_forms import StopForms, single_forms, stop_forms
 from multidrop.drives.stop_readings import ENDLESS, Activity, read_activity
 
 STOP_TRIES = 3
-BETWEEN = 0.1
+READING_PAUSE = 0.1
 """Time between two readings of a drive that may be slowing down, s."""
-RAMP = 30.0
-"""How long a drive is read that slows down, or was stopped in vain, s."""
+LONGEST_SLOWING = 30.0
+"""Longest time for which a drive is read after a stop while it slows down or goes on, s."""
 MOST_STORED_STOPS = 3
 """How often a stop is written again for a drive that stored it."""
 
@@ -81,7 +81,8 @@ class Stopping:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
 
         `started`: what was started in each of `only`; only that is stopped, where the line allows it.
-        `follows`: it may be the one that follows a call of `ahead`. Failures go to `Halt.trouble`.
+        `follows`: a stop of all drives takes over what `ahead` has begun, if anything; with False it leaves that to the
+        next one. Failures go to `Halt.trouble`.
         """
         drives = tuple(self._roster.all_drives if only is None else only)
         halt = Halt(self._link, self._link.stamp(), self._link.stops, only is None, drives)
@@ -109,19 +110,20 @@ class Stopping:
             written = ahead or self._write_now(halt)
             halt.data, halt.written = written.data, tuple(data for _, data in written.written)
             halt.missed.update(written.forms.missed)
-            # A late reply to the stop of one would pass for that to a request of another, with its mark behind it.
+            # Some drives reply to a stop. Such a reply may be late and pass for the reply to another drive's request,
+            # and a mark after that request would confirm it. So the requests to all of these drives end, too.
             repliers = [drive for drive in self._roster.all_drives if drive.state.codec.stop_replies]
             only = None
             if not halt.whole:  # the bytes may stop other drives as well
                 halt.others = () if halt.single else self._reached(halt.drives, halt.data)
                 only = {*GLOBAL, *(drive.address for drive in (*halt.affected, *repliers))}
-            since = None if ahead is None else ahead.since(link.line.transmitted)
+            since = None if ahead is None else ahead.since(link.line.transmitted_at)
             link.line.stop(at, *written.pieces, only=only, since=since)
             if written.first is not None:
                 link.line.put_first(written.first)
             self._note_written(written)
             if halt.single:
-                link.debris.stop_written(b"".join(piece.data for piece in written.pieces), link.line.transmitted)
+                link.debris.stop_written(b"".join(piece.data for piece in written.pieces), link.line.transmitted_at)
             for drive in halt.affected:
                 if not halt.spares_programs(drive):
                     halt.programs.setdefault(drive, _ran(drive, halt))
@@ -139,15 +141,15 @@ class Stopping:
     def _note_written(self, begun: BegunStop) -> None:
         line = self._link.line
         for when, data in begun.written:
-            line.wrote(data, when, whole=not begun.stops_all or (begun.invalidates and data == begun.data))
-            self._link.debris.stop_written(data, line.transmitted)
+            line.note_written(data, when, whole=not begun.stops_all or (begun.invalidates and data == begun.data))
+            self._link.debris.stop_written(data, line.transmitted_at)
 
     def _went_on(self) -> None:
         """Take over the pieces that another thread has written while the loop was held up."""
         link, begun = self._link, self._ahead.take(True)
         if begun is None or link.lost:
             return
-        link.line.went_on(begun.pieces, begun.since(link.line.transmitted))
+        link.line.went_on(begun.pieces, begun.since(link.line.transmitted_at))
         self._note_written(begun)
         for drive in self._roster.all_drives:
             if drive.state.codec.stop_replies:
@@ -175,14 +177,17 @@ class Stopping:
         if forms is None or link.away or link.transport.pending:
             return None
         begun = BegunStop(forms, forms.immediate, now, [*forms.repeats], stops_all=False)
-        return begun if link.transport.write(begun.wrote(begun.data, now, link.line.byte_time)) else None
+        return begun if link.transport.write(begun.note_written(begun.data, now, link.line.byte_time)) else None
 
     def _write_now(self, halt: Halt) -> BegunStop:
-        """Drop what is unsent and write a stop. One that is still leaving is dropped by one of all drives alone."""
+        """Drop what is unsent and write a stop.
+
+        An earlier stop that is still being sent is not dropped, unless it is for some drives and the new one for all.
+        """
         link, forms, now = self._link, stop_forms(self._roster, None if halt.whole else halt.drives), self._link.now()
         line = link.line
-        under_way = BegunStop(forms, forms.immediate, line.transmitted, [*forms.pieces], stops_all=halt.whole)
-        leaving = line.only_stop and (link.transport.pending or now < under_way.clear(line.byte_time))
+        under_way = BegunStop(forms, forms.immediate, line.transmitted_at, [*forms.pieces], stops_all=halt.whole)
+        leaving = line.last_write_was_stop and (link.transport.pending or now < under_way.clear(line.byte_time))
         leaving = leaving and (line.stops_all or not halt.whole)  # a stop of some drives holds up none of all
         halt.single = bool(halt.started) and not leaving
         if halt.single and (single := self._write_single(halt, forms)) is not None:
@@ -191,7 +196,7 @@ class Stopping:
         if leaving:
             if halt.whole:
                 return under_way
-            if forms.gap:  # the gap behind what is leaving comes first, and before the rest of that this stop
+            if forms.gap:  # wait for the gap after what is being sent, then write this stop before the rest of that
                 return replace(under_way, pieces=[*forms.repeats], first=StopPiece(forms.immediate, forms.gap))
             begun, dropped = replace(under_way, pieces=[*forms.repeats]), 0
         else:
@@ -199,7 +204,7 @@ class Stopping:
             with isolated(f"taking back what {link.name} has not sent", halt.trouble):
                 dropped = link.transport.discard(whole=forms.framed)
             begun.data, begun.invalidates = forms.written(bool(dropped or line.half_sent(now)))
-        link.transport.write(begun.wrote(begun.data, now, line.byte_time))
+        link.transport.write(begun.note_written(begun.data, now, line.byte_time))
         return begun
 
     # What follows
@@ -212,10 +217,10 @@ class Stopping:
         if not self._link.away and confirm:
             self._begin_to_confirm(halt)
         elif self._link.reserved:
-            self.unasked()
+            self.count_as_done()
 
-    def unasked(self) -> None:
-        """Count the stops as done, on a line where no drive can be asked: a later loss writes none of them again."""
+    def count_as_done(self) -> None:
+        """Count the stops as done on a line whose drives cannot be read: they are not written again after a loss."""
         self._unconfirmed.clear()
 
     # After a loss
@@ -288,7 +293,7 @@ class Stopping:
             link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
         before: dict[Drive, Activity] = {}
         active: dict[Drive, Activity] = {}
-        tries, until = 0, link.now() + RAMP
+        tries, until = 0, link.now() + LONGEST_SLOWING
         while unconfirmed and link.now() < until:
             activities = {
                 drive: await self._read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)
@@ -317,10 +322,10 @@ class Stopping:
             once = [drive for drive, activity in activities.items() if activity.none and halt.fate(drive) is Fate.SENT]
             unconfirmed = [*active, *undecided, *once]
             if unconfirmed:
-                await asyncio.sleep(BETWEEN)
+                await asyncio.sleep(READING_PAUSE)
         if active and tries < STOP_TRIES:
             names = ", ".join(drive.shown for drive in active)
-            link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
+            link.notify(f"{names}: slows down for more than {LONGEST_SLOWING:g} s", warning=True)
 
     async def _read(self, drive: Drive, halt: Halt) -> Activity:
         """Read what a drive does; where that cannot be read, it is a doubt of the stop."""

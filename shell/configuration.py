@@ -108,7 +108,7 @@ class ScreenSettings:
     times: str = "clock"
 
 
-DEFAULT_LOOK = ScreenSettings()
+DEFAULT_SCREEN = ScreenSettings()
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Settings:
     state: Path = field(default_factory=lambda: state_folder())
     guards: Guarding = Guarding()
     log: LogSettings = LogSettings()
-    look: ScreenSettings = DEFAULT_LOOK
+    screen: ScreenSettings = DEFAULT_SCREEN
     allowed: tuple[Path, ...] = ()
     """Further folders to which paths of cell files may lead, in `simulator.allow`."""
     sections: Mapping[str, Any] = field(default_factory=dict)
@@ -205,7 +205,7 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
     own = _own_units(document.get("own_units", []), where)
     connections = {name: _connection(name, table, where, own) for name, table in tables.items()}
     guards, log = _guards(document.get("guards", {}), where), _log(document.get("log", {}), where)
-    look = _look(document.get("screen", {}), document.get("keys", {}), where)
+    screen_settings = _screen_settings(document.get("screen", {}), document.get("keys", {}), where)
     hint = "write [simulator] with allow = [...]"
     simulator = _table(document.get("simulator", {}), "simulator", ("allow",), where, hint)
     allowed = text_list(simulator, "simulator", "allow", where)
@@ -214,7 +214,7 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
         connections,
         guards=guards,
         log=log,
-        look=look,
+        screen=screen_settings,
         allowed=tuple(Path(where).parent / os.path.expanduser(path) for path in allowed),
         sections=read,
         own_units=own,
@@ -329,7 +329,7 @@ def _log(found: Any, where: str) -> LogSettings:
     return LogSettings(always, int(size * MEGABYTE), int(files))
 
 
-def _look(screen: Any, keys: Any, where: str) -> ScreenSettings:
+def _screen_settings(screen: Any, keys: Any, where: str) -> ScreenSettings:
     table = _table(screen, "screen", (*CHOICES, "theme"), where, "write [screen]")
     if not isinstance(keys, dict):
         raise Diagnostic("keys is not a table", where, "write [keys]")

@@ -33,7 +33,7 @@ class LinePath:
 
     async def text(self, parsed: DriveLine, origin: Origin) -> None:
         """Send a text to its drive and publish what it prints; on a bus in raw mode send it with its terminator."""
-        bus = self._workspace.bus(origin.played(parsed.bus))
+        bus = self._workspace.bus(origin.bus_of_role(parsed.bus))
         if (raw := self._workspace.of(bus).raw) is not None:
             return await self._raw_text(raw, parsed, origin)
         drive = self._workspace.drive(bus.name, parsed.address)
@@ -49,8 +49,8 @@ class LinePath:
             hint = f"@{name}: TEXT sends text; /raw off finds the drives"
             raise Diagnostic(f"{name} is raw: it has no address {parsed.address}", typed, hint)
         workspace.publish(Entered(workspace.now(), typed, by, name), origin)
-        self.allow(by)
-        await self.undoubted([raw.bus], by)
+        self.check_latch(by)
+        await self.ask_about_doubts([raw.bus], by)
         await self.guard(raw.bus.at(""), parsed.text, by)
         starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
         await self.send_bytes(raw.bus, raw.encoded(parsed.text), origin, starts)
@@ -65,7 +65,7 @@ class LinePath:
         raw = self._workspace.of(bus).raw
         if raw is None:
             raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
-        self.allow(origin.by)
+        self.check_latch(origin.by)
         await self.agreed_to_write(bus.at(""), text_of(data), origin.by)
         if starts:
             self._automations.starts(origin, raw.everyone)
@@ -91,7 +91,7 @@ class LinePath:
             writes = f"'{what}' writes" if what else "it writes"
             await self._workspace.questions.confirm(f"{writes}, and {drive.state.stranger}", name, by=by)
 
-    async def undoubted(self, buses: Sequence[Bus], by: By) -> None:
+    async def ask_about_doubts(self, buses: Sequence[Bus], by: By) -> None:
         """Ask once for each line that lacks names, units or guards. Raises Diagnostic where that is not agreed to.
 
         Also raises it while the stop key is doubted.
@@ -111,7 +111,12 @@ class LinePath:
     async def starting(
         self, origin: Origin, drive: Drive, text: str = "", *, parts: bool = False
     ) -> AsyncIterator[None]:
-        """Send in the body a line, or what can start anything in a drive. `parts`: it is several requests."""
+        """Record what is sent to a drive in the body of this context, and that it may start motion or a program.
+
+        `text`: the line that is sent; without it, what is sent may start anything. `parts`: it is sent as several
+        requests, so after a refusal some may have been executed. Raises Unreferenced, Diagnostic or Stopped before
+        anything is sent, where it must not start the drive, and what the body raises.
+        """
         if text and not drive.starts(text):
             async with sending(self._automations, origin, drive, text, starts=False, parts=parts):
                 yield
@@ -133,7 +138,7 @@ class LinePath:
                     drive.commanded_at = before
                 raise
 
-    def allow(self, by: By) -> None:
+    def check_latch(self, by: By) -> None:
         """Raise Stopped after a stop, but not for an operator's line."""
         if self._workspace.latched and by is not By.OPERATOR:
             raise Stopped(LATCHED)
@@ -187,13 +192,13 @@ class LinePassage:
         workspace, typed = self._workspace, self._parsed.typed.strip()
         entered = Entered(workspace.now(), typed, self._origin.by, self._bus.name, self._drive.address)
         workspace.publish(entered, self._origin)
-        self._path.allow(self._origin.by)
+        self._path.check_latch(self._origin.by)
 
     async def _resolve_doubt(self) -> None:
         """Ask once where names, units or guards may not be in force, but for a line that only reads."""
         doubt = self._workspace.doubted or self._workspace.of(self._bus).doubt
         if doubt and not _only_reads(self._drive, self._text):
-            await self._path.undoubted([self._bus], self._origin.by)
+            await self._path.ask_about_doubts([self._bus], self._origin.by)
 
     async def _convert(self) -> None:
         """Make the drive's own numbers of quantities, and ask about a move that leaves its travel."""

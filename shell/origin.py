@@ -26,7 +26,7 @@ class LastLine:
 class Origin:
     """Who enters a line and to what it belongs. By default a person at the session.
 
-    The lines of a script or macro have that of the line that runs it, but for what is replaced.
+    A line of a script or macro has the origin of the line that runs the script or macro, with some fields replaced.
     """
 
     by: By = By.OPERATOR
@@ -42,7 +42,7 @@ class Origin:
     """Takes the word of a `/wait ended`, for the script that it is a line of."""
     last: LastLine | None = None
     """What its sender has sent last; None: its waits look from the last line of anyone."""
-    beyond: bool = False
+    may_leave_travel: bool = False
     """Its moves may leave their travel."""
     published: list[BaseException] | None = None
     """The failures that were published already in the line, of a person or a program, that it is a part of."""
@@ -58,14 +58,14 @@ class Origin:
         if self.printed is not None and isinstance(event, Printed | Output):
             self.printed.append(event.text)
 
-    def played(self, name: str) -> str:
+    def bus_of_role(self, name: str) -> str:
         """The name of the bus that plays a role; any other name stays."""
         return self.roles.get(name, name)
 
     def target(self, target: str) -> tuple[str, str]:
         """The name of a bus and the address of a target, of which each may be empty."""
         bus, address = split_target(target)
-        return self.played(bus), address
+        return self.bus_of_role(bus), address
 
     def cast(self, roles: Mapping[str, str]) -> Origin:
         """The same with further roles."""

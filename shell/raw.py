@@ -29,9 +29,9 @@ ROW_PAUSE = 0.05
 TERMINATORS = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n", "none": b""}
 """What follows a typed text, by its name."""
 _LOWEST = "NUL SOH STX ETX EOT ENQ ACK BEL BS TAB LF VT FF CR SO SI"
-CONTROLS = {name: bytes([code]) for code, name in enumerate(_LOWEST.split())}
+CONTROLS = {name: bytes([code]) for code, name in enumerate(_LOWEST.split()) if name != "FF"}
 CONTROLS |= {"XON": b"\x11", "XOFF": b"\x13", "NAK": b"\x15", "ESC": b"\x1b", "DEL": b"\x7f"}
-"""Control bytes by name."""
+"""Control bytes by name. FF is the byte 0xFF, so a form feed has no name."""
 _NAMED = {0x0D: "\\r", 0x0A: "\\n", 0x09: "\\t"}
 _SHOWN = tuple(chr(byte) if 0x20 <= byte <= 0x7E else _NAMED.get(byte, f"\\x{byte:02x}") for byte in range(0x100))
 _END = re.compile(rb"\r\n|\n|\r(?=[^\n])", re.DOTALL)

@@ -149,12 +149,12 @@ class Session(Workspace):
             await self.front.ready()
         target, place = DriveLine(""), self.place
         typed = line if isinstance(line, str) else line.typed
-        without, origin = origin is None and self.origin.automation is None, origin or self.origin
+        no_origin, origin = origin is None and self.origin.automation is None, origin or self.origin
         published = [] if origin.published is None else origin.published
         origin, by = replace(origin, published=published), origin.by
         with self.under_way(f"running {typed.strip()}"):
             try:
-                if without and being_called():
+                if no_origin and being_called():
                     raise Diagnostic("a feature ran it without its origin; it was not sent", typed, WITHOUT_ORIGIN)
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
@@ -316,7 +316,7 @@ class Call:
 
     def bus(self, name: str = "") -> Bus:
         """Find an open bus by name or role; the selected one for an empty name. Raises Diagnostic."""
-        return self.session.bus(self.origin.played(name))
+        return self.session.bus(self.origin.bus_of_role(name))
 
     def drive(self, target: str = "") -> Drive:
         """Find the drive of `ADDR` or `BUS:ADDR`; the selected drive for an empty target."""
@@ -358,9 +358,9 @@ class VerbPath:
         session.publish(Entered(session.now(), parsed.typed.strip(), by), origin)
         verb = find(parsed.name)
         call = Call(session, verb, parsed.rest, origin, parsed.shown)
-        session.path.allow(by)
+        session.path.check_latch(by)
         if call.changes:
-            await session.path.undoubted([*session.buses.values()], by)
+            await session.path.ask_about_doubts([*session.buses.values()], by)
         if by is not By.MACRO and (line := call.recorded()) is not None:
             session.recorder.record(line, session.now())
         work = call.work()
@@ -384,6 +384,6 @@ def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
 
 def _place_of(origin: Origin, target: DriveLine, selected: Place) -> Place:
     """The bus and the address that a line was for; `selected`: those that were selected when it was typed."""
-    bus = origin.played(target.bus) or selected.bus
+    bus = origin.bus_of_role(target.bus) or selected.bus
     plain = target.text and target.address is None and bus == selected.bus
     return Place(bus, selected.address if plain else target.address or "")

@@ -80,7 +80,7 @@ async def _check(units: SessionUnits, drive: Drive, field: Field, axis: ScaledAx
 
 
 async def _confirm(units: SessionUnits, what: str, name: str, origin: Origin) -> None:
-    if not (origin.beyond or TRAVEL in units.workspace.settings.guards.off):
+    if not (origin.may_leave_travel or TRAVEL in units.workspace.settings.guards.off):
         await units.workspace.questions.confirm(what, name, by=origin.by, beyond=True)
 
 

@@ -145,9 +145,9 @@ class Transport(ABC):
     def follow(self, make: Callable[[int], bytes | None], key: bool = False) -> bool:
         """Write `make(bytes that wait)` behind what was written, from any thread, and drop nothing.
 
-        `key`: it counts as a `preempt`. Else it does so only between a `preempt` and the last `yielded`. `make` may
-        give nothing, so that what waits is passed on, or None: then the result is False, as where the pipe is broken or
-        cannot do this.
+        `key`: a press of the stop key. It counts as a `preempt`: `yielded` must be called for it, too. Without it, this
+        works only while a `preempt` waits for its `yielded`. `make` may return no bytes, so that only what waits is
+        passed on, or None. The result is False for None, and where the pipe is broken or cannot do this.
         """
         return False
 

@@ -27,7 +27,8 @@ from multidrop.transports import Descriptor, Lost, PortControl, Received, Transp
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""
-_LOOK = 0.005
+CLOSE_POLL = 0.005
+"""Time between two looks, while closing, at whether all bytes have been sent, s."""
 
 T = TypeVar("T")
 
@@ -104,7 +105,7 @@ class Pipe(Transport):
         try:
             deadline = self._loop.time() + LINGER
             while self._broken is None and not self._idle() and self._loop.time() < deadline:
-                await asyncio.sleep(_LOOK)
+                await asyncio.sleep(CLOSE_POLL)
         finally:
             self._halt()
             await asyncio.shield(self._let_go())

@@ -91,7 +91,7 @@ class FrameSplitter:
         self._held = bytearray()
 
     def take(self, data: bytes) -> Iterator[tuple[Kind, bytes]]:
-        """Take bytes in, and return the frames that are whole by now. Raises Garbled at the first wrong byte."""
+        """Take bytes in, and return the frames that are whole by now. Raises GarbledFrame at the first wrong byte."""
         self._held += data
         while len(self._held) >= HEAD_BYTES:
             kind, size = self._held[0], int.from_bytes(self._held[1:HEAD_BYTES])
@@ -114,7 +114,7 @@ _FULL = 65536
 """Bytes that wait for a slow reader, from which on the port is not read."""
 _LINGER = 1.0
 """Seconds that the end waits for the driver, and for the reader of what was said last."""
-_LOOK = 0.002
+_DRIVER_POLL = 0.002
 """Seconds between two looks at what the driver holds."""
 
 
@@ -132,7 +132,7 @@ class Relay:
         """Bytes for the port since the beginning: dropped or taken by the driver; reported as sent."""
 
     def receive(self, data: bytes) -> None:
-        """Take in what arrived, and pass it on. Raises Garbled; OSError where the port is lost."""
+        """Take in what arrived, and pass it on. Raises GarbledFrame; OSError where the port is lost."""
         for kind, payload in self._frames.take(data):
             if kind is Kind.DATA:
                 self.queue += payload
@@ -290,7 +290,7 @@ class _Loop:
         relay = self._relay
         reads = [self._source] + ([self._port] if len(relay.out) < _FULL else [])
         writes = ([self._sink] if relay.out else []) + ([self._port] if relay.queue else [])
-        patience = _LOOK if relay.held else max(_LOOK, self._last + self._silence - _now())
+        patience = _DRIVER_POLL if relay.held else max(_DRIVER_POLL, self._last + self._silence - _now())
         readable, writable, _ = select.select(reads, writes, [], patience)
         return readable, writable
 
@@ -327,4 +327,4 @@ class _Loop:
             if not (waits or self._relay.port.unsent()):
                 break
             reads = reads and self._write()
-            time.sleep(_LOOK)
+            time.sleep(_DRIVER_POLL)

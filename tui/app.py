@@ -29,7 +29,7 @@ from textual.screen import Screen
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.broken_configuration import placed, placed_in_file
-from multidrop.shell.configuration import DEFAULT_LOOK, ScreenSettings, Settings, parse
+from multidrop.shell.configuration import DEFAULT_SCREEN, ScreenSettings, Settings, parse
 from multidrop.shell.connect.urls import wrong_urls
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.sections import sections
@@ -89,13 +89,13 @@ class MultidropApp(Dressed):
         urls: Sequence[str],
         assist: Assist,
         driver: type[Driver] | None = None,
-        look: ScreenSettings = DEFAULT_LOOK,
+        screen_settings: ScreenSettings = DEFAULT_SCREEN,
         model: ScreenModel | None = None,
         purpose: Purpose | None = None,
     ) -> None:
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
-        super().__init__(look, driver)
+        super().__init__(screen_settings, driver)
         self.session, self.urls, self.assist = session, list(urls), assist
         figures, named, between = partial(figures_at, session), partial(name_at, session), partial(between_at, session)
         self.model = model or ScreenModel(lambda: session.selected_bus, lambda: session.buses, figures, named, between)
@@ -103,7 +103,7 @@ class MultidropApp(Dressed):
         self.boundary.own(self, lambda: self._is_composed)
         self._end_boundary: Callable[[], None] = lambda: None
         self.purpose, self.macros = purpose or Purpose(session), FunctionKeys()
-        self.keymap = keymap(bindings(), look.keys)
+        self.keymap = keymap(bindings(), screen_settings.keys)
         self.presenter = Presenter(session, self.model, self.purpose, self.macros, self.keymap, self.boundary)
         self.main = MainScreen(
             self.assist.complete,
@@ -112,7 +112,7 @@ class MultidropApp(Dressed):
             lambda line, empty: self.typist.typed(line, empty),
             lambda lines: self.typist.pasted(lines),
         )
-        self.main.times = look.times
+        self.main.times = screen_settings.times
         self.keyboard = Keyboard(self, self._tell)
         self.outbox = Outbox(session, self._warn, self.run_worker)
         self.selection = Selection(
@@ -136,13 +136,13 @@ class MultidropApp(Dressed):
         """The reading of the terminal goes on after the app, until `Terminal.release`, for the stop key."""
         self._own_task: asyncio.Task[Any] | None = None
         self.frames = Frames(self._paint, self.call_later, lambda: self.presenter.behind)
-        self.dress(look)
+        self.dress(screen_settings)
         self.model.look.ink = ink_of(self.signs.font)
         self._set_actions()
         self.set_keymap(self.keymap.changed)
         self._troubles = [*map(str, session.settings.problems)]
-        wrong = [*self.keymap.troubles, *wrong_theme(look.theme)]
-        self._troubles += [str(placed_in_file(trouble, look.where)) for trouble in wrong]
+        wrong = [*self.keymap.troubles, *wrong_theme(screen_settings.theme)]
+        self._troubles += [str(placed_in_file(trouble, screen_settings.where)) for trouble in wrong]
 
     def _set_actions(self) -> None:
         """Make what keys, the palette and the session ask of the screen."""
@@ -348,7 +348,7 @@ class MultidropApp(Dressed):
         if self.model.changed:
             self.model.changed = False
             with self.boundary.at("what is open"):
-                self._look_again()
+                self._read_again()
         elif panels:
             self._poll()
         with self.boundary.at("the transcripts"):
@@ -366,7 +366,7 @@ class MultidropApp(Dressed):
             self._raise_banner()
         return True
 
-    def _look_again(self) -> None:
+    def _read_again(self) -> None:
         """Read buses, drives, selection, macros and the latch again: any may have changed."""
         if self.session.quitting:
             if not self.leaving.over:
@@ -465,10 +465,10 @@ def bindings() -> list[BindingType]:
     return [*MultidropApp.BINDINGS, *(binding for screen in screens for binding in screen.BINDINGS)]
 
 
-def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
+def configuration_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
     """What is wrong in a configuration beyond its form: keys, themes, the URLs of connections, files that it names."""
-    look = found.look
-    troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme)]
+    screen_settings = found.screen
+    troubles = [*keymap(bindings(), screen_settings.keys).troubles, *wrong_theme(screen_settings.theme)]
     for name, section in sections().items():
         try:
             troubles += section.unreadable(found.section(name))
@@ -480,4 +480,4 @@ def look_troubles(found: Settings, text: str, where: str) -> list[Diagnostic]:
 
 def troubles_of_text(text: str, where: str) -> list[Diagnostic]:
     """The same of the text of a configuration file that is being edited."""
-    return look_troubles(parse(text, where, lenient=True), text, where)
+    return configuration_troubles(parse(text, where, lenient=True), text, where)

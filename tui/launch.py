@@ -61,7 +61,7 @@ async def _run(
     try:
         prepare(session)
         with collected_at_rest(partial(at_rest, session)):
-            app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
+            app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.screen)
             app.stops_to_the_end = True
             begin(session)
             if swallows():

@@ -31,7 +31,7 @@ RULES = {
 }
 MOST_KEPT_EXCHANGES = 20
 """The exchanges of a drive in which a printed line is looked for."""
-REPEATS = 3
+NAK_REPEATS = 3
 """How often a command that was rejected as damaged is sent again."""
 READINGS = 2
 OTHER_TAB_DELAY = timedelta(seconds=5)
@@ -217,7 +217,7 @@ class _Session:
             yield "after a stop", f"{entry.command!r} was typed before the stop"
         if typed not in last or typed is None:
             return
-        again = NAK in typed.heard and typed.asked and typed.sent <= REPEATS
+        again = NAK in typed.heard and typed.asked and typed.sent <= NAK_REPEATS
         if typed.sent and not again:
             yield "twice", f"{entry.command!r} was sent {typed.sent + 1} times"
         typed.sent, typed.asked, typed.heard = typed.sent + 1, 0, ""

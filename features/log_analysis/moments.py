@@ -208,7 +208,7 @@ def _zone(text: bytes) -> tzinfo | None:
 
 
 def _known(paths: Sequence[Path], end: LogEnd, at: datetime, last: LogEntry | None) -> Iterator[KnownMoment]:
-    """Yield what was known at the end of some entries, if these have anything. `last`: see Known."""
+    """Yield what was known at the end of some entries, if these have anything. `last`: see KnownMoment."""
     search = Search(paths)
     search.run(end)
     if search.found or search.session is not None:

@@ -64,7 +64,7 @@ class PlantApp(Dressed):
     broker: PlantWatch
 
     def __init__(self, url: str, settings: Settings) -> None:
-        super().__init__(settings.look)
+        super().__init__(settings.screen)
         self.target, self._settings = parse_target(url, "plant"), settings
         self._rows: list[PlantRow] = []
         self._chosen: TopicPlace | None = None
@@ -72,7 +72,7 @@ class PlantApp(Dressed):
         self._is_composed = False
         self.boundary = Boundary(settings.state, self.tell, "everything else goes on")
         self.boundary.own(self, lambda: self._is_composed)
-        self.dress(settings.look)
+        self.dress(settings.screen)
 
     def compose(self) -> ComposeResult:
         yield Roles()

@@ -315,7 +315,7 @@ class Receiver:
         self._model = MirrorModel(self._session, self._host)
         assist = Assist(self._session, settings)
         purpose = Watching(self._session)
-        self._app = MultidropApp(self._session, [], assist, driver, settings.look, self._model, purpose)
+        self._app = MultidropApp(self._session, [], assist, driver, settings.screen, self._model, purpose)
         self._app.presenter.notes.append(lambda width: note(self._host.shared.watchers, width))
         return self._app
 

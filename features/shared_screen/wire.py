@@ -69,7 +69,7 @@ def greeting() -> bytes:
 
 
 def greeted(line: bytes) -> tuple[str, str]:
-    """The version and the name in a greeting. Raises Garbled."""
+    """The version and the name in a greeting. Raises GarbledMessage."""
     word, _, rest = line.decode(errors="replace").strip().partition(" ")
     version, _, name = rest.partition(" ")
     if word != WORD or not version or len(line) > LONGEST_GREETING:
@@ -109,7 +109,7 @@ class Items:
         self._held = b""
 
     def take(self, data: bytes) -> list[Item]:
-        """Take bytes; return the items of the lines that are complete. Raises Garbled."""
+        """Take bytes; return the items of the lines that are complete. Raises GarbledMessage."""
         *lines, self._held = (self._held + data).split(b"\n")
         if len(self._held) > LONGEST_MESSAGE_LINE:
             raise GarbledMessage(f"a line of more than {LONGEST_MESSAGE_LINE} bytes")
@@ -132,7 +132,7 @@ class Items:
 
 
 def _read(kind: Any, value: Any) -> Any:
-    """Make a value of a type from JSON. Raises Garbled for any other value."""
+    """Make a value of a type from JSON. Raises GarbledMessage for any other value."""
     form, inner, taken = _form(kind)
     if form is None:
         if isinstance(value, taken) and (kind is bool or not isinstance(value, bool)):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-QUIET_TIME, LONGEST_QUIET = 0.6, 2.0
-"""Seconds without a byte after which the drives have replied to what made a line harmless, and the longest wait.
-
-A busy drive takes up to half a second. This wait is rare: a client has gone within a line.
+NO_REPLY, QUIET_TIME, LONGEST_QUIET = 0.3, 0.1, 1.0
+"""Seconds without any reply, and without a byte more after one, until the drives have replied to what made a line
+harmless; and the longest wait. A client gives its own command up after 0.4 s without a reply, so the wait is shorter.
 """
 
 
@@ -20,11 +19,11 @@ class Settling:
 
     def begin(self, now: float, size: int, baud: int) -> None:
         left = now + 10.0 * size / max(baud, 1)
-        self.until, self._limit, self.heard = left + QUIET_TIME, left + LONGEST_QUIET, b""
+        self.until, self._limit, self.heard = left + NO_REPLY, left + LONGEST_QUIET, b""
 
     def took(self, data: bytes, now: float) -> None:
         self.heard += data
-        self.until = min(max(self.until, now + QUIET_TIME), self._limit)
+        self.until = min(now + QUIET_TIME, self._limit)
 
     def over(self, now: float) -> bool:
         if now >= self.until:

@@ -235,7 +235,7 @@ class AsyncDrive(DriveFacts):
         async with self._calls.moves(drive):  # a mode and its move belong together
             kept = [name for name, (_, at) in drive.settings.items() if at == drive.commands]
             commands = drive.commands + len(lines)
-            await self._calls.run(lambda origin: self._send(replace(origin, beyond=beyond), *lines))
+            await self._calls.run(lambda origin: self._send(replace(origin, may_leave_travel=beyond), *lines))
             if drive.commands == commands and "=" not in "".join(lines):  # a move changes no setting
                 drive.settings |= {name: (drive.settings[name][0], commands) for name in kept}
 

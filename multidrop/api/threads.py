@@ -46,7 +46,7 @@ class LoopThread:
         return self._thread.is_alive() and not self._ended
 
     def begin(self, work: Coroutine[Any, Any, T]) -> concurrent.futures.Future[T]:
-        """Begin work in the loop, from another thread. Raises RuntimeError from its own, Ended after its end."""
+        """Begin work in the loop, from another thread. Raises RuntimeError from its own, LoopEnded after its end."""
         if threading.current_thread() is self._thread:
             work.close()
             raise RuntimeError("a blocking call in the thread of its session would wait for itself")

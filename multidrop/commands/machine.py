@@ -81,11 +81,11 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
         if connection.names:
             names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in connection.names.items())
             lines.append(f"names = {{ {names} }}")
-    look, log, guards = found.look, found.log, found.guards
-    wrong = {"theme"} if wrong_theme(look.theme) else set[str]()
-    theme = "by the terminal" if wrong else look.theme or "by the terminal"
-    lines += rows("screen", {"theme": theme, "signs": look.signs, "times": look.times}, wrong)
-    lines += rows("keys", keys, {name for name, text in look.keys.items() if keys.get(name) != text})
+    screen, log, guards = found.screen, found.log, found.guards
+    wrong = {"theme"} if wrong_theme(screen.theme) else set[str]()
+    theme = "by the terminal" if wrong else screen.theme or "by the terminal"
+    lines += rows("screen", {"theme": theme, "signs": screen.signs, "times": screen.times}, wrong)
+    lines += rows("keys", keys, {name for name, text in screen.keys.items() if keys.get(name) != text})
     lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
     tables = {name: section.shown(found.section(name)) for name, section in sections().items()}
     tables["simulator"] = {"allow": list(map(str, found.allowed))}
@@ -98,9 +98,9 @@ def check() -> int:
     """Report what is wrong; exit code 0 if nothing is."""
     settings = configuration.load(lenient=True)
     text = _text(places.config_file())
-    from multidrop.tui.app import look_troubles
+    from multidrop.tui.app import configuration_troubles
 
-    troubles = look_troubles(settings, text, str(places.config_file()))
+    troubles = configuration_troubles(settings, text, str(places.config_file()))
     write(sys.stderr, *map(str, (*settings.problems, *troubles)))
     if not (troubles or settings.problems):
         state = "is right" if text else "does not exist: all settings are the defaults"
@@ -113,8 +113,8 @@ def _keys(found: Settings) -> dict[str, str]:
     from multidrop.tui.app import bindings
     from multidrop.tui.keymap import keymap
 
-    kept = keymap(bindings(), found.look.keys)
-    return {name: found.look.keys[name] if name in kept.changed else kept.shown(name) for name in sorted(kept.keys)}
+    kept = keymap(bindings(), found.screen.keys)
+    return {name: found.screen.keys[name] if name in kept.changed else kept.shown(name) for name in sorted(kept.keys)}
 
 
 def _text(file: Path) -> str:

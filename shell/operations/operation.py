@@ -58,8 +58,8 @@ class Scripted(NamedTuple):
 
     kind: VerbKind = VerbKind.STEP
     check: Callable[..., None] | None = None
-    """Raises Diagnostic for arguments that are wrong before anything is sent. It is given a `Checking` of
-    `shell.scripts.use`, and the arguments."""
+    """Raises Diagnostic for arguments that are wrong before anything is sent. It is given a `LineCheck`
+    of `shell.scripts.use`, and the arguments."""
     bare: bool = False
     """Its names have no braces: it has an expression."""
     steers: bool = False
@@ -82,7 +82,7 @@ class Examples(NamedTuple):
 
 
 Call = Any
-"""`shell.verbs.call.Call`, which knows the session and so all verbs; a function names it, and mypy checks its body."""
+"""`shell.session.Call`, which knows the session and so all verbs; a function names it, and mypy checks its body."""
 
 
 def typed(call: Call) -> str:

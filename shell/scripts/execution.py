@@ -62,7 +62,7 @@ class ScriptPace:
 
 
 MOST_SHOWN_PLACES = 3
-"""The number of lines that a failed `/expect` shows."""
+"""The number of places of failed `/verify` lines that the report shows."""
 CUT = "ended before it was done"
 """The error of a line that was under way at the end of its script."""
 RECENT = 5

@@ -40,7 +40,7 @@ def bind(workspace: Workspace, origin: Origin, macro: Macro, given: Mapping[str,
     """
     bound = {}
     for role in macro.roles:
-        outer = origin.played(role)
+        outer = origin.bus_of_role(role)
         bus = given.get(role) or (outer if outer in workspace.buses else only_bus(workspace, macro, role))
         if not bus:
             raise unbound(workspace, macro, role)
@@ -123,7 +123,7 @@ class _Planning:
         if not isinstance(parsed, DriveLine) or not (parsed.bus or parsed.address or self._selected):
             return None
         try:
-            drive = self._workspace.drive(origin.played(parsed.bus), parsed.address)
+            drive = self._workspace.drive(origin.bus_of_role(parsed.bus), parsed.address)
         except NoAnswer:
             return None
         except Diagnostic as problem:

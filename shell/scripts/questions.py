@@ -50,7 +50,7 @@ class MacroSelection:
 
     def _is_address(self, word: str) -> bool:
         """True if a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
-        return ":" not in word and self._origin.played(word) not in self._workspace.buses
+        return ":" not in word and self._origin.bus_of_role(word) not in self._workspace.buses
 
     def target(self, target: str) -> str:
         """The target of a question, with what the macro's selection adds."""

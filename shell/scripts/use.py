@@ -18,7 +18,10 @@ from multidrop.shell.session import Session
 
 
 class CheckFailed(DriveError):
-    """An `/assert` or `/expect` did not find what it wants."""
+    """A check in a script did not hold. Any verb of scripts may raise it.
+
+    It makes the report of a script say "failure", where any other exception makes it say "error".
+    """
 
 
 @dataclass(frozen=True)

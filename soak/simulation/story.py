@@ -65,25 +65,30 @@ def _job(seed: int, step: int) -> Act:
     return jobs[(seed * JOBS + step - FIRST_JOB) % len(jobs)]
 
 
-def _drawn(world: World, step: int, rng: Random) -> Act:
-    """Draw the act of a step."""
+def every_act() -> set[str]:
+    """The names of all acts."""
+    return {act.name for acts in (ACTS, OPERATORS, HELD_UP, MEETINGS, CREWS, AT_LAST, WORKSHOP) for act in acts}
+
+
+def drawn(seed: int, step: int, rng: Random) -> Act:
+    """Draw the act of a step. It is told where the machine has what it needs."""
     if step >= FIRST_JOB:
-        return _job(world.seed, step)
+        return _job(seed, step)
     if step >= AFTER:
         return AT_LAST[step - AFTER]
     if step >= CREW:
         return rng.choices(CREWS, [each.weight for each in CREWS])[0]
     act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
     seeds, steps = AT_WORK
-    apart = Random(f"{world.seed} work {step}")
-    if Random(f"{world.seed} work").random() < seeds and apart.random() < steps:
+    apart = Random(f"{seed} work {step}")
+    if Random(f"{seed} work").random() < seeds and apart.random() < steps:
         return apart.choices(OPERATORS, [each.weight for each in OPERATORS])[0]
     seeds, steps = STARVED
-    apart = Random(f"{world.seed} held up {step}")
-    if Random(f"{world.seed} held up").random() < seeds and apart.random() < steps:
+    apart = Random(f"{seed} held up {step}")
+    if Random(f"{seed} held up").random() < seeds and apart.random() < steps:
         return apart.choices(HELD_UP, [each.weight for each in HELD_UP])[0]
-    apart = Random(f"{world.seed} meeting {step}")
-    if Random(f"{world.seed} meetings").random() < MEETING and apart.random() < MEETING:
+    apart = Random(f"{seed} meeting {step}")
+    if Random(f"{seed} meetings").random() < MEETING and apart.random() < MEETING:
         return apart.choices(MEETINGS, [each.weight for each in MEETINGS])[0]
     return act
 
@@ -91,7 +96,7 @@ def _drawn(world: World, step: int, rng: Random) -> Act:
 async def tell(world: World, step: int) -> None:
     """Let one thing happen, once a session is there, and time pass."""
     rng = Random(f"{world.seed} step {step}")
-    act = _drawn(world, step, rng)
+    act = drawn(world.seed, step, rng)
     if not act.where(world):
         return
     await world.ready.wait()

@@ -200,7 +200,7 @@ async def test_the_line_knows_how_long_a_stop_leaves_and_what_it_cut_off(desk):
     await asyncio.sleep(1.0)
     desk.bus.stop()
     (stop,) = desk.sent
-    assert line.transmitted == pytest.approx(desk.bus.now() + len(stop) * byte_time)
+    assert line.transmitted_at == pytest.approx(desk.bus.now() + len(stop) * byte_time)
     assert not line.half_sent(desk.bus.now()), "no line was cut off"
     await asyncio.sleep(3.0)
     desk.events.clear()
@@ -209,7 +209,7 @@ async def test_the_line_knows_how_long_a_stop_leaves_and_what_it_cut_off(desk):
     desk.bus.stop()
     stop = desk.sent[-1]
     assert b"~" * 65 in stop and line.half_sent(desk.bus.now()), "until it has left whole"
-    assert line.transmitted == pytest.approx(desk.bus.now() + len(stop) * byte_time)
+    assert line.transmitted_at == pytest.approx(desk.bus.now() + len(stop) * byte_time)
     await refused(moving)
     await asyncio.sleep(0.2)
     assert not line.half_sent(desk.bus.now())

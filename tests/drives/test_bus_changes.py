@@ -167,7 +167,7 @@ def test_a_stop_goes_on_until_every_drive_has_had_its_turn(quiet, goes_on):
 def test_each_write_is_noted_with_its_time_and_has_left_after_its_bytes():
     each = begun()
     assert each.since(7.0) == 7.0
-    assert each.wrote(b"abc", 3.0, 0.01) == b"abc"
-    assert each.wrote(b"d", 4.0, 0.01) == b"d"
+    assert each.note_written(b"abc", 3.0, 0.01) == b"abc"
+    assert each.note_written(b"d", 4.0, 0.01) == b"d"
     assert each.written == [(3.0, b"abc"), (4.0, b"d")]
     assert each.left == 4.01 and each.since(7.0) == 4.0

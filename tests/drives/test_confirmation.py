@@ -13,7 +13,7 @@ from multidrop.drives.events import Sample
 from multidrop.drives.halts import Halt
 from multidrop.drives.readings import MotionReading, ProgramReading
 from multidrop.drives.stop_readings import ENDLESS, NOTHING, Activity, read_activity
-from multidrop.drives.stopping import BETWEEN, RAMP, Stopping
+from multidrop.drives.stopping import LONGEST_SLOWING, READING_PAUSE, Stopping
 
 pytestmark = pytest.mark.virtual
 RESTS = Activity(0, False, "7")
@@ -119,7 +119,7 @@ async def test_a_drive_that_is_read_at_rest_twice_is_reported_once_with_its_plac
     a, b = Drive(link, "a", RESTS), Drive(link, "b", Activity(0, False, "1, 2"))
     made, halt = await confirmed(a, b, link=link)
     assert link.told == [("a: stopped, velocity 0 at 7", False), ("b: stopped, velocity 0 at 1, 2", False)]
-    assert [len(each.times) for each in (a, b)] == [2, 2] and a.times[1] - a.times[0] == pytest.approx(BETWEEN)
+    assert [len(each.times) for each in (a, b)] == [2, 2] and a.times[1] - a.times[0] == pytest.approx(READING_PAUSE)
     assert made.unconfirmed == [] and made.again == [] and not halt.vain and made.tasks == []
 
 
@@ -164,7 +164,7 @@ async def test_after_three_stops_the_power_is_to_be_cut(found, does, end):
     assert [text for text, _ in link.told if "STILL" in text] == [f"{end} after 3 stops: a, b; cut the power"]
     assert [text for text, _ in link.told if text.startswith("a:")] == [f"a: {does}; stop sent again"] * 2
     assert all(warning for _, warning in link.told)
-    assert a.times[-1] - a.times[0] == pytest.approx(RAMP, abs=2 * BETWEEN)
+    assert a.times[-1] - a.times[0] == pytest.approx(LONGEST_SLOWING, abs=2 * READING_PAUSE)
 
 
 async def test_what_moves_and_what_runs_on_is_named_each_by_itself():
@@ -216,7 +216,7 @@ async def test_while_its_line_may_still_be_refused_it_is_watched():
     a.commanded_at, a.starting = 1e9, 1
     asyncio.get_running_loop().call_later(1.0, setattr, a, "commanded_at", float("-inf"))
     made, _ = await confirmed(a, link=link)
-    assert a.times[0] == pytest.approx(1.0, abs=2 * BETWEEN)
+    assert a.times[0] == pytest.approx(1.0, abs=2 * READING_PAUSE)
     assert link.told[-1] == ("a: stopped, velocity 0 at 7", False)
 
 

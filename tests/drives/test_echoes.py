@@ -22,26 +22,26 @@ class Language:
 
 def watching(sent: bytes = b"PR P\r", answer: bool = True) -> tuple[EchoWatch, Any]:
     watch, language = EchoWatch(), Language(answer)
-    watch.wrote(sent, language)  # type: ignore[arg-type]
+    watch.note_written(sent, language)  # type: ignore[arg-type]
     return watch, language
 
 
 def test_a_repetition_is_removed_however_it_comes():
     echo = LocalEcho()
     assert echo.sift(b"ab") == (b"", b"ab")
-    assert echo.wrote(b"PR\r") == b""
+    assert echo.note_written(b"PR\r") == b""
     assert [echo.sift(each) for each in (b"x", b"P", b"R\r12")] == [(b"", b""), (b"", b""), (b"x", b"12")]
     assert echo.own == echo.held == b""
     assert echo.sift(b"more") == (b"", b"more")
-    echo.wrote(b"PR\r")
+    echo.note_written(b"PR\r")
     assert echo.sift(b"PR\r12345") == (b"", b"12345")
 
 
 def test_the_next_write_returns_what_was_held_for_the_one_before():
     echo = LocalEcho()
-    echo.wrote(b"AB")
+    echo.note_written(b"AB")
     echo.sift(b"A?")
-    assert echo.wrote(b"CD") == b"A?"
+    assert echo.note_written(b"CD") == b"A?"
     assert (echo.own, echo.held) == (b"CD", b"")
     assert echo.forget() == b"" and echo.own == b""
 
@@ -85,7 +85,7 @@ def test_bytes_come_one_by_one_and_those_before_the_last_write_are_forgotten():
     watch, language = watching()
     assert EchoWatch().repeated(b"PR P\r") == b""
     assert [watch.repeated(b"PR P\r"[at : at + 1]) for at in range(5)] == [b"", b"", b"", b"", b"PR P\r"]
-    watch.wrote(b"PR V\r", language)
+    watch.note_written(b"PR V\r", language)
     assert watch.repeated(b"PR P\r") == b"" and watch.repeated(b"PR V\r") == b"PR V\r"
 
 
@@ -100,36 +100,36 @@ def test_only_so_much_is_kept_to_look_for_it():
 
 def test_only_requests_are_looked_for_and_only_so_many():
     watch, language = watching()
-    watch.wrote(b"\x1b\x1b\x1b\x1b", None)
+    watch.note_written(b"\x1b\x1b\x1b\x1b", None)
     assert watch.repeated(b"\x1b\x1b\x1b\x1b") == b""
-    watch.wrote(b"", language)
+    watch.note_written(b"", language)
     assert watch.repeated(b"x") == b""
     for _ in range(WATCHED - 2):
-        watch.wrote(b"PR P\r", language)
+        watch.note_written(b"PR P\r", language)
     assert watch.repeated(b"PR P\r") == b"PR P\r"
-    watch.wrote(b"PR P\r", None)
-    watch.wrote(b"PR P\r", language)
+    watch.note_written(b"PR P\r", None)
+    watch.note_written(b"PR P\r", language)
     assert watch.repeated(b"PR P\r") == b""
 
 
 def test_until_a_drive_has_replied_what_came_is_kept_without_our_own_bytes():
     heard = FirstBytes()
     heard.received(b"aPR P\rb")
-    heard.wrote(b"PR P\r")
+    heard.note_written(b"PR P\r")
     heard.received(b"PR P\r")
     assert heard.came == b"aPR P\rbPR P\r" and not heard.answered
     assert heard.foreign() == b"abPR P\r"
-    heard.wrote(b"PR P\r")
+    heard.note_written(b"PR P\r")
     assert heard.foreign() == b"ab"
 
 
 def test_after_a_reply_nothing_is_kept():
     heard = FirstBytes()
     heard.received(b"x")
-    heard.wrote(b"PR P\r")
+    heard.note_written(b"PR P\r")
     heard.replied("a")
     heard.received(b"PR P\ry")
-    heard.wrote(b"z")
+    heard.note_written(b"z")
     assert heard.answered and heard.came == heard.foreign() == b""
 
 
@@ -138,6 +138,6 @@ def test_only_so_much_is_kept():
     heard.received(b"x" * (MOST_HEARD + 1))
     assert heard.came == b"x" * MOST_HEARD
     for _ in range(MOST_HEARD):
-        heard.wrote(b"y")
-    heard.wrote(b"x")
+        heard.note_written(b"y")
+    heard.note_written(b"x")
     assert heard.foreign() == heard.came, "what was written after that is not kept"

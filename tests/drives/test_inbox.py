@@ -10,10 +10,10 @@ from multidrop.dialects import Decoded, End, Kind, Reply, Request
 from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.inbox import (
     CERTAIN,
-    LASTS,
+    DEBRIS_LASTS,
     LATE_WITHIN,
+    LONGEST_WAIT_FOR_QUIET,
     MOST_EVIDENCE,
-    NEVER_QUIET,
     TAIL,
     Debris,
     Doubt,
@@ -321,8 +321,8 @@ def after_stop(now: float = 10.0) -> Debris:
 def test_for_a_while_after_a_stop_its_debris_is_not_shown(line, shown):
     known = re.compile("stop replied")
     assert after_stop().removed((line, "tail."), known, 10.0) == ((line, "tail.") if shown else ("tail.",))
-    assert after_stop().removed((line,), known, 10.0 + LASTS) == ((line,) if shown else ())
-    assert after_stop().removed((line,), known, 10.1 + LASTS) == (line,)
+    assert after_stop().removed((line,), known, 10.0 + DEBRIS_LASTS) == ((line,) if shown else ())
+    assert after_stop().removed((line,), known, 10.1 + DEBRIS_LASTS) == (line,)
 
 
 def test_what_a_language_does_not_know_as_debris_is_shown():
@@ -344,7 +344,7 @@ def test_a_request_without_an_expected_print_makes_no_value_debris():
 
 def test_what_was_written_before_the_stop_counts_until_its_debris_is_over():
     debris = after_stop()
-    debris.request_written(b"aPR V\r", asked(), 10.0 + LASTS)
+    debris.request_written(b"aPR V\r", asked(), 10.0 + DEBRIS_LASTS)
     debris.stop_written(b"", 11.0)
     assert debris.removed(("PR P", "PR V"), None, 11.0) == ()
     debris.request_written(b"aPR A\r", asked(), 12.0)
@@ -356,7 +356,7 @@ def test_debris_may_come_after_a_stop_alone():
     debris = Debris()
     assert not debris.may_come(0.0)
     debris.stop_written(b"\x1b", 1.0)
-    assert debris.may_come(1.0 + LASTS) and not debris.may_come(1.1 + LASTS)
+    assert debris.may_come(1.0 + DEBRIS_LASTS) and not debris.may_come(1.1 + DEBRIS_LASTS)
 
 
 # Leftovers
@@ -469,7 +469,7 @@ def test_a_line_that_never_ends_is_published_in_pieces():
     box = Box()
     for tenth in range(11):
         box.inbox.receive(b"x", tenth / 10)
-    assert box.inbox.tail_at() == NEVER_QUIET
+    assert box.inbox.tail_at() == LONGEST_WAIT_FOR_QUIET
     box.inbox.sort(0.99)
     assert box.lines == []
     box.inbox.sort(1.0)
@@ -491,7 +491,7 @@ def test_after_a_reply_the_wait_for_the_rest_begins_again():
     box.inbox.receive(b".", 0.9)
     assert box.inbox.buffer == b"rest." and box.inbox.tail_at() == 0.9 + TAIL
     box.inbox.receive(b".", 1.49)
-    assert box.inbox.tail_at() == 0.5 + NEVER_QUIET
+    assert box.inbox.tail_at() == 0.5 + LONGEST_WAIT_FOR_QUIET
 
 
 def test_a_numbered_language_keeps_the_rest_whatever_happens():
@@ -515,7 +515,7 @@ def test_after_a_pause_the_rest_of_any_other_is_forgotten():
 
 def test_a_loss_publishes_what_came_and_forgets_our_own_bytes():
     box = Box(echo=True)
-    box.inbox.wrote(b"PR P\r", 1.0)
+    box.inbox.note_written(b"PR P\r", 1.0)
     box.inbox.receive(b"one\r\nPR", 1.0)
     box.inbox.cut_off(2.0)
     assert box.published[-1] == (2.0, ("one", "PR")) and box.lines == ["one", "PR"]
@@ -524,7 +524,7 @@ def test_a_loss_publishes_what_came_and_forgets_our_own_bytes():
 
 def test_what_was_under_way_before_our_own_bytes_is_no_reply():
     box = Box(echo=True)
-    box.inbox.wrote(b"PR P\r", 1.0)
+    box.inbox.note_written(b"PR P\r", 1.0)
     box.inbox.receive(b"one\r\ntw", 1.01)
     assert box.inbox.tail_at() == 1.01 + TAIL
     box.inbox.receive(b"PR P\r5", 1.02)
@@ -533,15 +533,15 @@ def test_what_was_under_way_before_our_own_bytes_is_no_reply():
 
 def test_what_is_no_repetition_of_ours_is_published_once_it_is_quiet():
     box = Box(echo=True)
-    box.inbox.wrote(b"PR P\r", 1.0)
+    box.inbox.note_written(b"PR P\r", 1.0)
     box.inbox.receive(b"one\r\n", 1.01)
     box.inbox.sort(1.01 + TAIL - 0.001)
     assert box.lines == []
     box.inbox.sort(1.01 + TAIL)
     assert box.lines == ["one"] and box.inbox.echo is not None and box.inbox.echo.held == b""
-    box.inbox.wrote(b"PR V\r", 2.0)
+    box.inbox.note_written(b"PR V\r", 2.0)
     box.inbox.receive(b"two", 2.0)
-    box.inbox.wrote(b"PR P\r", 2.1)
+    box.inbox.note_written(b"PR P\r", 2.1)
     assert box.lines == ["one", "two"]
 
 
@@ -609,12 +609,12 @@ def test_behind_an_adapter_that_repeats_a_stop_forgets_everything():
 
 def test_a_repetition_that_was_found_and_stays_away_is_looked_for_again_and_a_given_one_is_not():
     box = Box()
-    box.inbox.wrote(b"PR P\r", 1.0, box.codec)
+    box.inbox.note_written(b"PR P\r", 1.0, box.codec)
     box.inbox.receive(b"one\r\nPR P\r5", 1.0)
     assert box.found == 1 and box.lines == ["one"] and box.inbox.buffer == b"5"
     box.inbox.doubt_echo()
     assert box.inbox.echo is None
-    box.inbox.wrote(b"PR V\r", 2.0, box.codec)
+    box.inbox.note_written(b"PR V\r", 2.0, box.codec)
     box.inbox.forget()
     box.inbox.receive(b"PR V\r6", 2.0)
     assert box.found == 2 and box.inbox.buffer == b"6"

@@ -139,7 +139,7 @@ def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_qu
     line.ask(request("PR P"))
     assert [event.data for event in line.events(0.0) if isinstance(event, Write)] == [b"MR 51200\r"]
     line.stop(0.01, StopPiece(b"\x1b"))
-    line.wrote(b"\x1b", 0.01)
+    line.note_written(b"\x1b", 0.01)
     assert line.ask(request("PR V"))
     run = LineRun(line, 3.0, {0.05: b"\r\n", 0.5: b"\r\n7\r\n"}, start=0.01)
     assert [(text, end) for _, text, end, _ in run.ended] == [
@@ -155,7 +155,7 @@ def test_a_print_long_after_a_stop_is_not_taken_for_the_reply_that_the_stop_cut_
     line.ask(request("PR P"))
     line.events(0.0)
     line.stop(0.01, StopPiece(b"\x1b"))
-    line.wrote(b"\x1b", 0.01)
+    line.note_written(b"\x1b", 0.01)
     line.ask(request("MR 1"))
     run = LineRun(line, 5.0, {3.0: b"77\r\n"}, start=0.01)
     assert [each for _, each in run.seen if isinstance(each, Unsolicited)] == [Unsolicited(3.0, ("77",))]
@@ -167,7 +167,7 @@ def test_a_stop_knows_whether_a_line_was_half_sent():
     line.events(0.0)
     assert line.half_sent(0.005) is True
     line.stop(0.005, StopPiece(b""))
-    line.wrote(b"\x1b", 0.005)
+    line.note_written(b"\x1b", 0.005)
     assert line.half_sent(1.0) is False
     line.stop(1.0, StopPiece(b""))
 
@@ -262,7 +262,7 @@ def test_a_stop_key_that_is_held_down_keeps_no_piece_of_the_stop_from_the_wire(e
     while now < 2.0:
         if now >= press:
             line.stop(now, *pieces)
-            line.wrote(b"stop", now)
+            line.note_written(b"stop", now)
             press += every
         written += [event.data for event in line.events(now) if isinstance(event, Write)]
         now += 0.001

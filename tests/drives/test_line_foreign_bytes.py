@@ -11,7 +11,7 @@ from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.drives.echoes import LONGEST_TAIL
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import LATE_WITHIN
-from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
+from multidrop.drives.line import LONGEST_LIST, LONGEST_WAIT_FOR_QUIET, Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.examples import examples
 from tests.support.line_run import LineRun
@@ -37,7 +37,7 @@ def test_a_wire_that_is_never_quiet_is_written_to_again_after_a_timeout():
     line.ask(request("PR V", expect=r"-?\d+"))
     run = LineRun(line, 20.0, chatter(0.01, 20.0))
     (_, _), (at, _) = run.written
-    assert at <= 4.0 + NEVER_QUIET + 0.1
+    assert at <= 4.0 + LONGEST_WAIT_FOR_QUIET + 0.1
 
 
 def test_what_shows_its_success_by_silence_is_not_waited_for_for_ever_while_a_program_prints():
@@ -48,7 +48,7 @@ def test_what_shows_its_success_by_silence_is_not_waited_for_for_ever_while_a_pr
     run = LineRun(line, 2.0, half)
     assert run.finished[0] == ("MR 1", End.SILENT, ())
     ended = next(at for at, event in run.seen if isinstance(event, Finished))
-    assert ended <= NEVER_QUIET + 0.1
+    assert ended <= LONGEST_WAIT_FOR_QUIET + 0.1
     assert set(run.strays[1:]) == {"Logic"}  # no line was cut in two by that
 
 
@@ -63,7 +63,7 @@ def test_a_program_that_never_ends_a_line_does_not_keep_the_wire_to_itself():
         now = min(later)
         line.receive(later.pop(now), now)
         sent = [event for event in line.events(now) if isinstance(event, Write)]
-    assert now <= 2.0 + NEVER_QUIET + 0.1
+    assert now <= 2.0 + LONGEST_WAIT_FOR_QUIET + 0.1
     assert "".join(run.strays).strip("0") == ""
 
 
@@ -73,7 +73,7 @@ def test_a_stop_is_repeated_on_a_wire_that_is_never_quiet():
     line.stop(0.0, StopPiece(b"\x1b"))
     run = LineRun(line, 5.0, chatter(0.01, 5.0))
     assert [data for _, data in run.written] == [b"\x1b"]
-    assert run.written[0][0] <= NEVER_QUIET + 0.1
+    assert run.written[0][0] <= LONGEST_WAIT_FOR_QUIET + 0.1
 
 
 def test_a_list_ends_even_where_a_program_prints_for_ever():
@@ -232,7 +232,7 @@ def test_without_any_echo_nothing_piles_up():
 def test_the_echo_of_a_stop_is_swallowed_too():
     line = echoing()
     line.stop(0.0, StopPiece(b"\x1b\n"))
-    line.wrote(b"\x1b\n", 0.0)
+    line.note_written(b"\x1b\n", 0.0)
     line.ask(request("PR V"))
     run = LineRun(line, 3.0, {0.001: b"\x1b\n", 0.12: b"\x1b\n", 0.5: b"PR V\r\r\n7\r\n"})
     assert run.finished == [("PR V", End.DONE, ("7",))]
@@ -248,10 +248,10 @@ def test_a_second_stop_cuts_no_line_but_one_within_its_spoiling_does():
     line.events(0.0)
     assert line.half_sent(0.004) is True
     line.stop(0.004, StopPiece(b"\x1b"))
-    line.wrote(b"\x1b", 0.004)
+    line.note_written(b"\x1b", 0.004)
     assert line.half_sent(0.0041) is False
     line.stop(0.0041, StopPiece(b"\x1b"))
-    line.wrote(b"\x1b" + b"~" * 65 + b"\r\x1b", 0.0041, whole=True)
+    line.note_written(b"\x1b" + b"~" * 65 + b"\r\x1b", 0.0041, whole=True)
     assert line.half_sent(0.02) is True
     line.stop(0.02, StopPiece(b"\x1b"))
 
@@ -297,7 +297,7 @@ def test_whatever_happens_every_request_ends_once_and_time_goes_on(em, check, ec
             now += more[0]
         elif what == "stop":
             line.stop(now, StopPiece(b"\x1b"))
-            line.wrote(b"\x1b", now)
+            line.note_written(b"\x1b", now)
         elif line.deadline is not None:
             now = line.deadline
         look()

@@ -7,12 +7,12 @@ import pytest
 
 from multidrop.dialects import Decoded, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.inbox import NEVER_QUIET, TAIL
+from multidrop.drives.inbox import LONGEST_WAIT_FOR_QUIET, TAIL
 from multidrop.drives.line import (
     CHATTER,
-    HELD_UP,
     LONG_QUIET,
     LONGEST_LIST,
+    MOST_HELD_UP_QUIETS,
     RECOVERY_QUIET,
     Finished,
     Flight,
@@ -68,7 +68,7 @@ def asked(text: str = "q", address: str = "a", kind: Kind = Kind.PRINT, patience
         (asked(timeout=0.1), b"", 1.0, 1.0, 2.2, 2.2),
         (asked(timeout=0.5), b"x\n", 9.0, 1.0, 9.2, 2.0 + CHATTER * 0.5),
         (asked(timeout=0.5), b"x", 4.0, 1.0, 4.2, 4.0 + TAIL),
-        (asked(timeout=0.5), b"x", 9.0, 1.0, 9.2, 2.0 + CHATTER * 0.5 + NEVER_QUIET),
+        (asked(timeout=0.5), b"x", 9.0, 1.0, 9.2, 2.0 + CHATTER * 0.5 + LONGEST_WAIT_FOR_QUIET),
         (asked(kind=Kind.LIST), b"x\n", 70.0, 1.0, 70.2, 2.0 + LONGEST_LIST),
         (asked(kind=Kind.COMMAND), b"x\n", 5.0, 1.0, 3.0, 6.0),
         (asked(kind=Kind.COMMAND), b"", 1.0, 1.0, 2.2, 3.0),
@@ -253,7 +253,7 @@ def test_a_stop_is_written_piece_by_piece_each_after_its_quiet():
     assert line.stopping and line.owed_pieces() == [A, piece("B", 0.3)]
     run = LineRun(line, 2.0)
     assert run.written == [(0.1, b"A"), (0.4, b"B")]
-    assert not line.stopping and line.only_stop
+    assert not line.stopping and line.last_write_was_stop
 
 
 def test_a_piece_that_further_stops_keep_back_is_written_after_four_times_its_quiet():
@@ -263,7 +263,7 @@ def test_a_piece_that_further_stops_keep_back_is_written_after_four_times_its_qu
         now = tenth * 0.05
         written += [(round(now, 2), each.data) for each in line.events(now) if isinstance(each, Write)]
         line.stop(now, A, B)
-    assert written[0] == (round(HELD_UP * 0.1, 2), b"A")
+    assert written[0] == (round(MOST_HELD_UP_QUIETS * 0.1, 2), b"A")
 
 
 @pytest.mark.parametrize(("only", "ended"), [(None, ["1", "2", "3"]), ({"a"}, ["1", "3"])])
@@ -313,7 +313,7 @@ def test_a_wire_that_broke_forgets_what_waits_and_what_was_to_be_repeated():
     line.events(0.1)
     line.ask(asked())
     assert line.cut_off(0.2, begun=False) is None
-    assert line.waiting == [] and line.owed_pieces() == [] and not line.only_stop and not line.half_sent(0.2)
+    assert line.waiting == [] and line.owed_pieces() == [] and not line.last_write_was_stop and not line.half_sent(0.2)
     line.ask(asked("q"))
     line.events(1.0)
     line.receive(b"ha", 1.0)

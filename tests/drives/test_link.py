@@ -301,7 +301,7 @@ async def test_a_persons_bytes_are_on_record_until_the_end_of_their_line_has_lef
     assert desk.link.cut == "" and desk.keeper.notes[1:] == ["ended"]
     assert desk.link.write_raw(b"MR")
     await asyncio.sleep(5)
-    assert desk.link.cut == "MR" and not desk.link.line.only_stop
+    assert desk.link.cut == "MR" and not desk.link.line.last_write_was_stop
 
 
 async def test_a_persons_bytes_that_a_stop_kept_back_are_on_no_record():
@@ -407,7 +407,7 @@ async def test_where_drives_reply_to_a_stop_its_rest_is_written_piece_by_piece_b
     desk = Desk(Replies(em=1), baud=1000)
     pieces = StopPiece(b"A" * 5, 0.1), StopPiece(b"B" * 5, 0.2), StopPiece(b"C", 0.6)
     desk.link.line.stop(desk.link.now(), *pieces)
-    desk.link.line.transmitted = begun = desk.link.now()
+    desk.link.line.transmitted_at = begun = desk.link.now()
     desk.link.shut()
     assert desk.pipe.written == []
     await desk.link.close()

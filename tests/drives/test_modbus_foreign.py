@@ -74,7 +74,7 @@ async def test_it_is_opened_and_read_and_written():
 
 @pytest.mark.parametrize(("busy", "fate"), [(0, Fate.STANDING), (1, Fate.RUNNING)])
 async def test_a_stop_is_confirmed_by_the_register_of_the_program(busy, fate, monkeypatch):
-    monkeypatch.setattr(stopping, "RAMP", 2.0)
+    monkeypatch.setattr(stopping, "LONGEST_SLOWING", 2.0)
     async with opened(BY=busy) as (bus, heard):
         (drive,) = await bus.identify(Hints())
         heard.clear()

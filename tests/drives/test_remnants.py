@@ -8,7 +8,7 @@ import pytest
 from multidrop.dialects import Owed, Request
 from multidrop.dialects.codec import Kind
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.inbox import LASTS, Debris, Leftovers
+from multidrop.drives.inbox import DEBRIS_LASTS, Debris, Leftovers
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
@@ -83,8 +83,8 @@ def test_what_counts_as_debris(text):
     left.request_written(b'aPR P,"a ",V\n', asked, 1.0)
     left.stop_written(b"\x1b~~~~~~\n", 2.0)
     shown = () if text in DEBRIS else (text,)
-    assert left.removed(("x 1", text), MCode.stop_debris, 2.0 + LASTS) == ("x 1", *shown)
-    assert left.removed((text,), MCode.stop_debris, 2.1 + LASTS) == (text,), "later, everything is shown"
+    assert left.removed(("x 1", text), MCode.stop_debris, 2.0 + DEBRIS_LASTS) == ("x 1", *shown)
+    assert left.removed((text,), MCode.stop_debris, 2.1 + DEBRIS_LASTS) == (text,), "later, everything is shown"
 
 
 # Of a session before

@@ -13,7 +13,7 @@ from multidrop.drives.silence import ECHO, NETWORK, NOISE, SERIAL, explained, re
 def link(came: bytes = b"", network: bool = False, other: str = "", suspects: str = "", written: bytes = b"") -> Any:
     heard = FirstBytes()
     heard.received(came)
-    heard.wrote(written)
+    heard.note_written(written)
     transport = SimpleNamespace(network=network, other_user=lambda: other, suspects=lambda: suspects)
     return SimpleNamespace(heard=heard, transport=transport)
 

@@ -27,10 +27,10 @@ class Desk:
             preempt=self._preempt, follow=self._follow, yielded=lambda note: note(self.last), preemptible=preemptible
         )
         self.line: Any = SimpleNamespace(
-            only_stop=False,
+            last_write_was_stop=False,
             stops_all=True,
             byte_time=0.0,
-            transmitted=5.0,
+            transmitted_at=5.0,
             overtaken=False,
             owed_pieces=lambda: [*self.owed],
             half_sent=lambda now: False,
@@ -87,7 +87,7 @@ def test_the_first_key_begins_a_stop_and_the_next_one_goes_on_with_it(desk: Desk
 
 
 def test_a_key_goes_on_with_a_stop_of_the_loop_or_begins_a_new_one_once_that_is_over(desk: Desk) -> None:
-    desk.line.only_stop, desk.owed, desk.waiting = True, [StopPiece(b"y", 0.2)], 1
+    desk.line.last_write_was_stop, desk.owed, desk.waiting = True, [StopPiece(b"y", 0.2)], 1
     desk.ahead.press()
     assert desk.did()[0] == ("follow", True, b"")
     desk.taken()
@@ -97,7 +97,7 @@ def test_a_key_goes_on_with_a_stop_of_the_loop_or_begins_a_new_one_once_that_is_
 
 
 def test_a_key_begins_a_stop_behind_one_of_some_drives_and_in_its_own_order(desk: Desk) -> None:
-    desk.line.only_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), *FORMS.repeats]
+    desk.line.last_write_was_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), *FORMS.repeats]
     desk.ahead.press()
     assert desk.did() == [("preempt", True, b"STOP"), ("after", 0.3)]
     assert desk.taken().pieces == [*FORMS.repeats]
@@ -106,8 +106,12 @@ def test_a_key_begins_a_stop_behind_one_of_some_drives_and_in_its_own_order(desk
 @pytest.mark.parametrize(("now", "first"), [(5.1, b"STOP"), (5.01, b"ST~STOP")])
 def test_so_it_does_where_a_thread_has_gone_on_with_that_one(desk: Desk, now: float, first: bytes) -> None:
     """What is still leaving of it may be cut off."""
-    desk.line.only_stop, desk.line.stops_all, desk.owed = True, False, [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)]
-    desk.line.transmitted, desk.line.byte_time = 4.8, 0.05
+    desk.line.last_write_was_stop, desk.line.stops_all, desk.owed = (
+        True,
+        False,
+        [StopPiece(b"y", 0.2), StopPiece(b"z", 0.2)],
+    )
+    desk.line.transmitted_at, desk.line.byte_time = 4.8, 0.05
     desk.ahead.watch(FORMS)
     desk.look()  # the loop is asked
     desk.look()
@@ -121,29 +125,29 @@ def test_so_it_does_where_a_thread_has_gone_on_with_that_one(desk: Desk, now: fl
 
 
 def test_a_piece_that_is_due_and_does_not_leave_is_tried_again_soon(desk: Desk) -> None:
-    desk.line.only_stop, desk.line.transmitted, desk.owed = True, 4.8, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.line.transmitted_at, desk.owed = True, 4.8, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
     assert desk.did() == [("after", RETRY_AFTER)]
 
 
-@pytest.mark.parametrize(("only_stop", "owed"), [(False, True), (True, False)])
+@pytest.mark.parametrize(("last_write_was_stop", "owed"), [(False, True), (True, False)])
 def test_nothing_is_looked_at_where_the_loop_has_written_all_or_something_else(
-    desk: Desk, only_stop: bool, owed: bool
+    desk: Desk, last_write_was_stop: bool, owed: bool
 ) -> None:
-    desk.line.only_stop, desk.owed = only_stop, [StopPiece(b"y", 0.2)] if owed else []
+    desk.line.last_write_was_stop, desk.owed = last_write_was_stop, [StopPiece(b"y", 0.2)] if owed else []
     desk.ahead.watch(FORMS)
     assert desk.did() == []
 
 
 def test_nor_on_a_transport_that_no_other_thread_may_write_to(monkeypatch: pytest.MonkeyPatch) -> None:
     desk = Desk(monkeypatch, preemptible=False)
-    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
     assert desk.did() == []
 
 
 def test_the_loop_is_asked_for_a_sign_of_life_before_its_stop_is_taken_from_it(desk: Desk) -> None:
-    desk.line.only_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
+    desk.line.last_write_was_stop, desk.owed = True, [StopPiece(b"y", 0.2)]
     desk.ahead.watch(FORMS)
     desk.did()
     desk.look()
@@ -172,7 +176,7 @@ def test_the_next_piece_is_written_once_it_is_due_and_nothing_waits(desk: Desk) 
 
 def held_up(desk: Desk) -> None:
     """The loop has begun a stop, was asked for a sign of life, and gives none."""
-    desk.line.only_stop = True
+    desk.line.last_write_was_stop = True
     desk.ahead.watch(FORMS)
     desk.look()
     desk.did()
@@ -183,7 +187,7 @@ def test_a_piece_is_taken_back_from_a_loop_that_is_held_up(desk: Desk) -> None:
     held_up(desk)
     desk.look()
     assert desk.did()[:2] == [("follow", False, None), ("follow", True, None)] and not desk.line.overtaken
-    desk.line.transmitted = 4.8
+    desk.line.transmitted_at = 4.8
     desk.look()
     assert desk.did()[:2] == [("follow", False, None), ("follow", True, b"y")] and desk.line.overtaken
     taken = desk.taken()
@@ -222,7 +226,7 @@ def test_a_stop_that_follows_no_key_takes_nothing_over(desk: Desk) -> None:
 def test_a_key_that_goes_on_with_a_stop_keeps_all_of_its_own_pieces_and_none_that_are_no_longer_meant(
     desk: Desk,
 ) -> None:
-    desk.line.only_stop, desk.line.transmitted = True, 4.0
+    desk.line.last_write_was_stop, desk.line.transmitted_at = True, 4.0
     desk.owed = [StopPiece(b"gone", 0.2)]
     desk.ahead.press()
     first, *others = FORMS.pieces

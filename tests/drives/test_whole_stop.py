@@ -10,7 +10,6 @@ from random import Random
 from types import SimpleNamespace
 
 import pytest
-from tests.drives.test_pmx import BYTE, Wire
 
 from multidrop.dialects import Hints, StopPiece
 from multidrop.drives import pacing
@@ -22,6 +21,7 @@ from multidrop.drives.stop_forms import StopForms, stop_forms
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.pmx.host.codec import STOP_PIECE_QUIET, Pmx
 from multidrop.simulator.serving.in_process import SimPipe
+from tests.families.pmx.test_line import BYTE, Wire
 from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.simulated_bus import SimulatedBus
 

@@ -97,8 +97,8 @@ def test_what_the_file_sets_has_no_remark(multidrop: Command, file: Path) -> Non
 
 
 def test_what_does_not_count_says_so_and_what_counts_in_its_place(file: Path) -> None:
-    look = Settings().look
-    settings = Settings(look=look.__class__(theme="pink", keys={"palette": "^G", "find": "F9"}))
+    screen = Settings().screen
+    settings = Settings(screen=screen.__class__(theme="pink", keys={"palette": "^G", "find": "F9"}))
     text = "[screen]\ntheme = 'pink'\n[keys]\npalette = '^G'\nfind = 'F9'\n"
     lines = shown(settings, {"palette": "^P", "find": "F9", "drive": "^O"}, text)
     refused = "   # default; the file's does not count"

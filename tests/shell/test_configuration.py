@@ -227,7 +227,7 @@ def test_a_value_that_is_kept_makes_its_table_and_leaves_the_rest(
     path = configuration.keep("screen", "times", "last")
     assert path.read_text(encoding="utf-8") == '[screen]\ntimes = "last"\n'
     configuration.keep("screen", "signs", "ascii")
-    assert configuration.load().look.times == "last" and configuration.load().look.signs == "ascii"
+    assert configuration.load().screen.times == "last" and configuration.load().screen.signs == "ascii"
 
 
 def test_lines_name_drives_only_where_every_one_does() -> None:

@@ -69,9 +69,9 @@ async def test_who_a_line_belongs_to_hears_what_it_enters_and_prints_and_nothing
 
 def test_a_role_is_played_by_the_bus_that_was_cast_last() -> None:
     origin = PERSON.cast({"line": "press", "other": "gantry"}).cast({"line": "gantry"})
-    assert [origin.played(name) for name in ("line", "other", "press", "")] == ["gantry", "gantry", "press", ""]
+    assert [origin.bus_of_role(name) for name in ("line", "other", "press", "")] == ["gantry", "gantry", "press", ""]
     assert origin.target("line:a") == ("gantry", "a") and origin.target("a") == ("", "a")
-    assert PERSON.played("line") == "line"
+    assert PERSON.bus_of_role("line") == "line"
 
 
 async def test_a_line_that_a_feature_by_others_runs_without_its_origin_is_refused_unsent(shop: CellSession) -> None:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from unittest import mock
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, NoAnswer, Stopped, TransportLost
@@ -327,7 +327,13 @@ def test_bytes_are_written_as_hex_names_and_text():
             parse_bytes(text)
 
 
+def test_ff_is_the_byte_that_it_is_in_hex_and_no_form_feed():
+    assert parse_bytes("FF") == parse_bytes("ff") == parse_bytes("0xFF") == b"\xff"
+    assert parse_bytes("0C") == parse_bytes("^L") == b"\x0c"
+
+
 @given(st.binary(max_size=200))
+@example(bytes(range(256)))
 def test_rows_hold_every_byte_and_no_control_character(data):
     for form in ByteForm:
         shown = list(form.rows(data))

@@ -86,7 +86,7 @@ async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.M
     async with CellSession(tmp_path, CELL) as cell:
         shelf = cell.session.front.transcripts = Shelf()
         await cell.session.run("/times")
-        assert (shelf.form, configuration.load().look.times) == ("start", "start")
+        assert (shelf.form, configuration.load().screen.times) == ("start", "start")
         await cell.session.run("/times last")
         assert file.read_text() == '# mine\n[screen]\ntheme = "multidrop-light"\ntimes = "last"\n'
         file.write_text("[[")

@@ -30,7 +30,7 @@ from soak.simulation.records.told import Fact
 from soak.simulation.runs import STEPS, derived, lives, result, run
 from soak.simulation.seeds import DERIVED, EVERY, FIXED, LAST
 from soak.simulation.shrinking import Life, shrunk
-from soak.simulation.story import AFTER, CREW, FIRST_JOB, WORKSHOP, whole
+from soak.simulation.story import AFTER, CREW, FIRST_JOB, WORKSHOP, drawn, every_act, whole
 from soak.simulation.system.process import Killed
 from soak.simulation.trace import readable
 from tests.support.paths import ROOT
@@ -46,6 +46,11 @@ def test_the_rules_hold(seed: int) -> None:
     world = lived(seed, whole(seed, STEPS))
     assert broken(world) == []
     assert world.history.commands
+
+
+def test_the_seeds_of_every_run_draw_every_act() -> None:
+    steps = [(seed, step) for seed in EVERY for step in whole(seed, STEPS)]
+    assert {drawn(seed, step, random.Random(f"{seed} step {step}")).name for seed, step in steps} == every_act()
 
 
 @pytest.mark.nightly

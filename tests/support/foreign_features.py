@@ -45,7 +45,7 @@ from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import Transport, Unreachable
-from multidrop.tui.app import look_troubles
+from multidrop.tui.app import configuration_troubles
 from tests.support.cell_session import bus, party
 from tests.support.own_features import load
 from tests.support.paths import ROOT
@@ -181,7 +181,9 @@ CALLS: Mapping[tuple[type, str], Call] = {
     (Scheme, "searched"): _of_scheme("searched", ""),
     (Section, "read"): lambda session, record: configuration.parse(TABLE, "f.toml"),
     (Section, "shown"): lambda session, record: sections()["slow"].shown({}),
-    (Section, "unreadable"): lambda session, record: look_troubles(Settings(sections={"slow": {}}), TABLE, "f.toml"),
+    (Section, "unreadable"): lambda session, record: configuration_troubles(
+        Settings(sections={"slow": {}}), TABLE, "f.toml"
+    ),
 }
 """How the core comes to call each function, of a record by others that was added, in the loop of a session."""
 ASYNC = {

@@ -86,10 +86,10 @@ def test_whatever_is_set_the_stop_stays_the_stop_and_every_function_has_its_own_
 
 @pytest.mark.tui
 async def test_a_key_that_was_set_works_and_is_shown() -> None:
-    look = ScreenSettings(
+    screen_settings = ScreenSettings(
         signs="full", keys={"palette": "^D", "page-drives": "F9", "play-f9": "Ctrl+F9"}, where="multidrop.toml"
     )
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
+    app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=screen_settings)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
         assert "^D everything" in app.main.lines("footer").plain and "F9 all drives" in app.main.lines("footer").plain
@@ -109,8 +109,8 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
 async def test_a_wrong_setting_is_said_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("multidrop.toml").write_text('[screen]\ntheme = "no-such"\nsigns = "ascii"\n[keys]\nnothing = "^D"\n')
-    look = ScreenSettings("no-such", "ascii", keys={"nothing": "^D"}, where="multidrop.toml")
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=look)
+    screen_settings = ScreenSettings("no-such", "ascii", keys={"nothing": "^D"}, where="multidrop.toml")
+    app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=screen_settings)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
         shown = app.main.page("press").plain
@@ -121,7 +121,7 @@ async def test_a_wrong_setting_is_said_at_the_start(tmp_path: Path, monkeypatch:
 
 @pytest.mark.tui
 async def test_ctrl_a_goes_to_the_start_of_a_line_and_from_there_to_all_drives() -> None:
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=ScreenSettings(signs="full"))
+    app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=ScreenSettings(signs="full"))
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press(*"R 5", "ctrl+a", "M")
         assert app.main.entry.value == "MR 5"
@@ -133,7 +133,7 @@ async def test_ctrl_a_goes_to_the_start_of_a_line_and_from_there_to_all_drives()
 
 @pytest.mark.tui
 async def test_help_is_for_where_you_are_and_can_be_searched() -> None:
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=ScreenSettings(signs="full"))
+    app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=ScreenSettings(signs="full"))
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+a", "f1")
         assert isinstance(app.screen, SearchDialog)
@@ -150,7 +150,7 @@ async def test_help_is_for_where_you_are_and_can_be_searched() -> None:
 
 @pytest.mark.tui
 async def test_what_was_used_lately_comes_after_the_stop() -> None:
-    app = MultidropApp(demo_session(), (), FakeAssist(), look=ScreenSettings(signs="full"))
+    app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=ScreenSettings(signs="full"))
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("ctrl+p", *"mouse off", "enter", "ctrl+p")
         assert isinstance(app.screen, SearchDialog)

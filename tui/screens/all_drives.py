@@ -34,13 +34,14 @@ URGENCY = (
 """The states, the worst first."""
 AT_REST = (ReadoutState.NO_CURRENT, ReadoutState.STOPPED, ReadoutState.IDLE)
 ROOMY, NARROW = 100, 80
-"""Widths from which the last seconds are wide, and below which trouble has their place and that of the velocity."""
-BETWEEN = 2
-"""Blank cells between the last column and what fills the row."""
+"""Widths of the page: from `ROOMY` on, the column of the last seconds is wide. Below `NARROW`, neither that column nor
+the velocity is shown, to leave room for trouble."""
+LAST_GAP = 2
+"""Blank cells between the last column and the text that fills the row."""
 WIDE_FROM, LEAST_ROOM = 110, 16
 """Least width of the page, and least rows below the list, with the chosen drive there."""
 HEAD_ROWS, FEWEST = 6, 8
-"""The rows of the page that are neither, and the least rows of the list."""
+"""Rows of the page that neither list drives nor show the chosen one, and the least rows of the list."""
 
 
 class DriveOnLine(NamedTuple):
@@ -176,7 +177,7 @@ def drive_row(place: DriveOnLine, now: float, width: int, chosen: bool) -> Row:
         text, role = column.span(place, now, chosen, cells)
         row.append((column.put(text, cells - beyond) + " " * column.gap, role))
         beyond = max(0, len(text) - cells) if column.right else 0
-    room, between = width - width_of(row), " " * (BETWEEN - columns[-1].gap)
+    room, between = width - width_of(row), " " * (LAST_GAP - columns[-1].gap)
     text, role = place.besides(room - len(between), now)
     return (*row, (fit(between + text, room), role))
 

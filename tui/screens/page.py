@@ -84,7 +84,7 @@ class PageHost:
     """Appends a line of the app's own to the transcript that is shown, with its mark."""
     last_records: Callable[[int], Sequence[Record]]
     """The last records of the transcript that is shown."""
-    look_troubles: Callable[[str, str], Sequence[Diagnostic]]
+    troubles_of_text: Callable[[str, str], Sequence[Diagnostic]]
     """What is wrong in the text of a configuration file with this name, as far as only the screen knows it."""
 
 

@@ -209,7 +209,7 @@ class ProgramPage(Page):
         self._compared = lines, unit
         findings = await asyncio.to_thread(examined, grammar, shown, unit, lines)
         if isinstance(grammar, ConfigurationGrammar):
-            more = map(problem_of, self.host.look_troubles(real_text(shown), text.name))
+            more = map(problem_of, self.host.troubles_of_text(real_text(shown), text.name))
             findings = replace(findings, problems=tuple(in_order([*findings.problems, *more])))
         self.take_text()
         if self.text is text and text.text == shown:

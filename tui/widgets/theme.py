@@ -162,20 +162,20 @@ class Dressed(App[int]):
     """An app with our themes, and with the signs that the font of its terminal holds."""
 
     ENABLE_COMMAND_PALETTE = False
-    """Textual's own palette; ours is a `Search`, in which keys keep their order."""
+    """Textual's own palette; ours is a `SearchDialog`, in which keys keep their order."""
 
-    def __init__(self, look: ScreenSettings, driver: type[Driver] | None = None) -> None:
+    def __init__(self, screen_settings: ScreenSettings, driver: type[Driver] | None = None) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
-        self.signs = SignFilter(signs_for(look.signs, os.environ))
+        self.signs = SignFilter(signs_for(screen_settings.signs, os.environ))
 
-    def dress(self, look: ScreenSettings) -> None:
+    def dress(self, screen_settings: ScreenSettings) -> None:
         """Use the theme that a configuration names, else one that fits the terminal."""
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = theme_for(None if self.no_color else self.console.color_system)
-        if look.theme in self.available_themes and not self.no_color:
-            self.theme = look.theme
+        if screen_settings.theme in self.available_themes and not self.no_color:
+            self.theme = screen_settings.theme
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """The filters of Textual, and the one that replaces signs; it comes last."""

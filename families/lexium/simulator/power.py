@@ -40,19 +40,19 @@ class Nvm:
         return bool(self.store.values.get("LK"))
 
     def save(self) -> None:
-        """S. Raises Fault (73)."""
+        """S. Raises DriveFault (73)."""
         if self._moving() and self._motor.axis.kind in MOVES:
             raise DriveFault(E.MOVING_SAVE)
         self.keep()
 
     def initialise(self) -> None:
-        """IP. Raises Fault (74)."""
+        """IP. Raises DriveFault (74)."""
         if self._moving():
             raise DriveFault(E.MOVING_CLEAR)
         self.load()
 
     def erase(self) -> None:
-        """Reset NVM to factory defaults, except what these leave alone. Raises Fault (73)."""
+        """Reset NVM to factory defaults, except what these leave alone. Raises DriveFault (73)."""
         if self._moving():
             raise DriveFault(E.MOVING_SAVE)
         fresh, kept = NonVolatileMemory(program=self._kept(ProgramContents(product=self._memory.product))), self.store
@@ -96,7 +96,7 @@ class Power:
         self.boots = 0
 
     def factory_defaults(self) -> None:
-        """FD: programs, variables and settings are gone. Raises Fault (73)."""
+        """FD: programs, variables and settings are gone. Raises DriveFault (73)."""
         self.nvm.erase()
         self.restart()
 

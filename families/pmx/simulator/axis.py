@@ -45,7 +45,7 @@ TIME_TOLERANCE = 1e-9
 
 
 class PmxAxis:
-    """X or Y. Raises Refusal for what it does not take."""
+    """X or Y. Raises PmxRefusal for what it does not take."""
 
     def __init__(self, name: str, settings: PmxSettings, world: World, spec: WorldSpec) -> None:
         self.name = name
@@ -74,7 +74,7 @@ class PmxAxis:
     def own_pace(self, *, strict: bool = True) -> MotionPace:
         """Work out its pace alone: its own speeds, or the global ones where those are 0 (7.1).
 
-        Raises Refusal for a low speed that does not fit, as for `paced`.
+        Raises PmxRefusal for a low speed that does not fit, as for `paced`.
         """
         low, high, up, down = (self.settings.of(name, self.name) for name in ("LSPD", "HSPD", "ACC", "DEC"))
         return paced(self.settings, self.name, (low * self.unit, high * self.unit), (up, down), strict=strict)

@@ -46,7 +46,7 @@ class BitWord:
 
 
 def number(text: str, low: int = -INT32, high: int = INT32 - 1, error: str = INVALID) -> int:
-    """Read a whole number in a range. Raises Refusal."""
+    """Read a whole number in a range. Raises PmxRefusal."""
     if not _INTEGER.fullmatch(text) or not low <= int(text) <= high:
         raise PmxRefusal(error)
     return int(text)
@@ -173,7 +173,7 @@ def get_register(pmx: PmxController, name: str) -> str:
 
 
 def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
-    """Set a register, and apply at once what follows from it. Raises Refusal."""
+    """Set a register, and apply at once what follows from it. Raises PmxRefusal."""
     register, kind = REGISTERS[name], name[:-1]
     if kind == "SLR":  # kept in thousandths; clients send more decimals (`%f`)
         ratio = Decimal(text) * SCALE if _RATIO.fullmatch(text) else None
@@ -215,7 +215,7 @@ _FORMS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
 
 
 def _move(pmx: PmxController, form: str, given: tuple[str, ...], t: float) -> None:
-    """Carry out a command of one of the forms, with what is given in it. Raises Refusal."""
+    """Carry out a command of one of the forms, with what is given in it. Raises PmxRefusal."""
     *_, named, last = given
     match form:
         case "move":

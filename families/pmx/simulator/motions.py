@@ -159,7 +159,7 @@ class StraightMove:
     """A straight line of both axes (manual 7.8.2): one motion along the path, of which each axis makes its share.
 
     The global speeds are those along the path (the manual leaves that open), in pulses/s with StepNLoop too (7.17).
-    What ends the line for one axis ends it for the other. Raises Refusal for a line that cannot begin.
+    What ends the line for one axis ends it for the other. Raises PmxRefusal for a line that cannot begin.
     """
 
     def __init__(self, axes: tuple[PmxAxis, PmxAxis], settings: PmxSettings) -> None:

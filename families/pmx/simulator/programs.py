@@ -6,7 +6,8 @@ of both calls `programs.advance(now)`, and `programs.deadline` is the time of th
 into that.
 
 The compiled lines are described in docs/pmx-lines.md. Values are 32-bit signed and wrap around; division rounds down
-(7.19.6). A line takes everything off the stack or is a Fault, so lines in an unknown order never run as something else.
+(7.19.6). A line takes everything off the stack or is a ProgramFault, so lines in an unknown order never run as
+something else.
 
 An error in a program takes it to SUB 31, once: a refused command, a limit or StepNLoop error of an axis that it has
 moved, an unknown line. Without SUB 31, or with an error in it, the program ends in error. An error of an axis that no
@@ -190,7 +191,7 @@ class PmxThread:
             machine.ended(now)
 
     def _carry_out(self, word: str, argument: str, now: float) -> None:
-        """Carry out a line, and go on to the next one unless it says where. Raises Fault."""
+        """Carry out a line, and go on to the next one unless it says where. Raises ProgramFault."""
         if word[0] != "&" and word not in _TAKING:
             self.take(0)
         match word:
@@ -295,7 +296,7 @@ class PmxThread:
                 self._go(start)
 
     def take(self, many: int) -> list[int | str]:
-        """Take everything off the stack, which must be so many values. Raises Fault."""
+        """Take everything off the stack, which must be so many values. Raises ProgramFault."""
         if len(self.stack) != many:
             held = self.machine.memory.line(self.at)
             raise ProgramFault(f"{held} takes {many} values, and {len(self.stack)} are there")
@@ -303,7 +304,7 @@ class PmxThread:
         return taken
 
     def number_of(self, value: int | str, now: float) -> int:
-        """Evaluate a number, a variable or a register. Raises Fault."""
+        """Evaluate a number, a variable or a register. Raises ProgramFault."""
         if isinstance(value, int):
             return value
         if value[0] == "V":
@@ -315,14 +316,14 @@ class PmxThread:
             raise ProgramFault(f"{value} answers {text}") from None
 
     def ask(self, text: str, now: float, *, changes: bool = True) -> str:
-        """Have the controller carry out an ASCII command. Raises Fault if it refuses."""
+        """Have the controller carry out an ASCII command. Raises ProgramFault if it refuses."""
         reply = self.machine.ask(self.number, text, now, changes=changes)
         if reply.startswith("?"):
             raise ProgramFault(f"{text} is answered {reply}")
         return reply
 
     def assign(self, target: str, value: int, now: float) -> None:
-        """Set a variable, a program's SR or a register. Raises Fault."""
+        """Set a variable, a program's SR or a register. Raises ProgramFault."""
         if target[0] == "V":
             self.machine.variables[int(target[1:])] = value
         elif target[:2] == "SR":

@@ -70,7 +70,7 @@ def paced(
 ) -> MotionPace:
     """Work out the pace of an axis from low and high speed, pulses/s, and both acceleration times, ms.
 
-    Raises Refusal for a low speed that does not fit the high one; not `strict`: a low speed that fits is used.
+    Raises PmxRefusal for a low speed that does not fit the high one; not `strict`: a low speed that fits is used.
     """
     low, high = speeds
     if not strict:

@@ -212,7 +212,7 @@ class TmclLineError(ValueError):
 
 
 def parse(text: str) -> TmclCall:
-    """The command in a line. Raises LineError."""
+    """The command in a line. Raises TmclLineError."""
     read_call = _read(text)
     if isinstance(read_call, TmclLineError):
         raise TmclLineError(*read_call.args)  # one that is kept would gather tracebacks

@@ -129,24 +129,26 @@ def _repeated(life: Lived) -> Iterator[str]:
             if begins < 0 or again or lost or any(at > stop.at + TAKEN_OVER for at in ends):
                 continue
             begins += not under_way(life, line, stop)
-            left = b"".join(data for _, port, data in history.written[begins:] if port == line)
-            left = left.replace(b"\xff\xff", b"\xff") if life.place(line[:2]).kind == "rfc2217" else left
+            left = _written(life, line, begins, len(history.written))
             yield from (
                 f"{line}: stop at {stop.at:.3f}, {each!r} did not leave again" for each in pieces if each not in left
             )
 
 
-def _written(life: Lived, line: str, index: int) -> bytes:
-    """What the write of a number has brought the drives of a line: a message of a network may be in several writes."""
-    history, kind = life.history, life.place(line[:2]).kind
+def _written(life: Lived, line: str, index: int, till: int = 0) -> bytes:
+    """What writes have brought the drives of a line: a message of a network may be in several of them.
+
+    They are the one of a number, or all from that on, up to the one before `till`.
+    """
+    history, kind, till = life.history, life.place(line[:2]).kind, till or index + 1
     first = max((begins for _, name, begins in history.opened if name == line and begins <= index), default=0)
     whole, before = (
-        b"".join(data for _, name, data in history.written[first:end] if name == line) for end in (index + 1, index)
+        b"".join(data for _, name, data in history.written[first:end] if name == line) for end in (till, index)
     )
     try:
         return for_drives(kind, whole)[len(for_drives(kind, before)) :]
     except GarbledFrame:  # bytes are no frames where a session before has left half of one
-        return history.written[index][2]
+        return whole[len(before) :]
 
 
 def under_way(life: Lived, line: str, stop: Stop) -> bool:

@@ -60,7 +60,7 @@ class WatchedPath(LinePath):
         session, history = self._workspace, self._world.history
         typed = parsed.typed.strip()
         with contextlib.suppress(Diagnostic, DriveError):
-            bus = session.bus(origin.played(parsed.bus))
+            bus = session.bus(origin.bus_of_role(parsed.bus))
             if bus.name in session.raw:
                 history.commands.pop(typed, None)
                 put = Put(session.now(), bus.name, "", str(parsed.text))

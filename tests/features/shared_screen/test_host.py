@@ -123,7 +123,7 @@ async def test_a_stop_is_written_by_the_watchers_thread_while_the_loop_is_blocke
     await until(lambda: shared.gate.watchers)
     assert peer.recv(200) == greeting()
     peer.sendall(b"\x18")
-    assert peer.recv(200) == b'[["Heard","",[1]]]\n'  # this call blocks the loop
+    assert peer.recv(200) == b'[["StopHeard","",[1]]]\n'  # this call blocks the loop
     assert (shared.ahead, shared.stops) == (1, [])
     await until(lambda: shared.stops)
     assert shared.stops == [shared.gate.watchers[0].name]

@@ -56,7 +56,7 @@ JSON = st.recursive(
     | st.booleans()
     | st.integers()
     | st.floats()
-    | st.sampled_from([*map(str, TYPES), "Sample", "Found", ""]),
+    | st.sampled_from([*map(str, TYPES), "Sample", "DriveFate", ""]),
     lambda inner: st.lists(inner, max_size=8) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
 )
 
@@ -64,11 +64,11 @@ JSON = st.recursive(
 def test_a_line_is_json_of_type_bus_and_fields() -> None:
     items = [Item(Sample(1.5, "a", 51200, -7, program=True), "press"), Item(StopHeard(2))]
     data = line(items)
-    assert data == b'[["Sample","press",[1.5,"a",51200,-7,"","",true]],["Heard","",[2]]]\n'
+    assert data == b'[["Sample","press",[1.5,"a",51200,-7,"","",true]],["StopHeard","",[2]]]\n'
     assert Items(TYPES).take(data) == items
     assert (
         line([Item(DriveFate(Fate.NOT_REACHED, "a", "press", "lost"))])
-        == b'[["Found","",["NOT_REACHED","a","press","lost"]]]\n'
+        == b'[["DriveFate","",["NOT_REACHED","a","press","lost"]]]\n'
     )
 
 
@@ -97,11 +97,11 @@ WRONG = (
     b"[" * 100_000 + b"\n",
     b"[" + b"9" * 5000 + b"]\n",
     b'[["os","",[1]]]\n',
-    b'[["Heard","",[true]]]\n',
-    b'[["Heard","",["1"]]]\n',
-    b'[["Heard","",[1,2]]]\n',
-    b'[["Heard",null,[1]]]\n',
-    b'[["Found","",["GONE","a","b",""]]]\n',
+    b'[["StopHeard","",[true]]]\n',
+    b'[["StopHeard","",["1"]]]\n',
+    b'[["StopHeard","",[1,2]]]\n',
+    b'[["StopHeard",null,[1]]]\n',
+    b'[["DriveFate","",["GONE","a","b",""]]]\n',
     b'[["Sample","",{"at":1}]]\n',
     b"[" + b" " * LONGEST_MESSAGE_LINE,
 )

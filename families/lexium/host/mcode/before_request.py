@@ -18,11 +18,11 @@ from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.errors import earlier_error
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.exchange import (
+    discard_late_replies,
     printed_value,
     question,
+    raise_refusal,
     read_error,
-    refused,
-    synchronise,
     value,
 )
 from multidrop.families.lexium.host.mcode.framing import NAK
@@ -41,12 +41,12 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
     if state.unconfirmed is not None:
         yield from _confirmed(state, request.text, "was not sent")
     elif state.settings_unknown:
-        yield from _limited(state, request.text, "was not sent", find_again(state, request))
+        yield from _in_time_left(state, request.text, "was not sent", find_again(state, request))
     elif state.reply_pending:
-        if not (yield from synchronise(state, request.priority)):
+        if not (yield from discard_late_replies(state, request.priority)):
             yield from find_again(state, request)
         state.synchronised()
-    if _unseen(state, request):
+    if _error_may_be_hidden(state, request):
         state.came_unasked()
     if request.kind is not Kind.PRINT and (state.error or state.running or state.others_heard):
         yield from _old_error(state, request)
@@ -63,11 +63,11 @@ def value_of(state: MCodeState, items: str, form: str) -> Procedure[str]:
 
 
 def _confirmed(state: MCodeState, text: str, fate: str) -> Procedure[None]:
-    return (yield from _limited(state, text, fate, confirm_drive(state, text, fate)))
+    return (yield from _in_time_left(state, text, fate, confirm_drive(state, text, fate)))
 
 
-def _limited(state: MCodeState, text: str, fate: str, steps: Procedure[T]) -> Procedure[T]:
-    """Look for the drive in the time that `first_print` has left of the line's. Raises NoAnswer."""
+def _in_time_left(state: MCodeState, text: str, fate: str, steps: Procedure[T]) -> Procedure[T]:
+    """Look for the drive in the rest of the line's time, of which `first_print` may have used some. Raises NoAnswer."""
     try:
         return (yield from limited(who(state), text, fate, steps, state.looking))
     finally:
@@ -90,12 +90,12 @@ def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
     if last is None:
         return
     # Report another drive than last time's, or other settings.
-    both = (
+    compared = (
         ("serial number", last.serial, state.serial),
         ("product", last.product, state.product),
         ("version", last.version, state.version),
     )
-    changed = [f"{word} {then} then, {now} now" for word, then, now in both if then and now and then != now]
+    changed = [f"{word} {then} then, {now} now" for word, then, now in compared if then and now and then != now]
     settings = (codec.party, codec.checksum, codec.em) != (last.party, last.checksum, last.em)
     if changed:
         state.note(f"{who(state)}: another drive replies than last time ({'; '.join(changed)})")
@@ -115,7 +115,7 @@ def _find_anywhere(state: MCodeState, place: ReplyPlace) -> Procedure[bool]:
     return bool(name) and (yield from find(state, ReplyPlace(True, name)))
 
 
-def _unseen(state: MCodeState, request: Request) -> bool:
+def _error_may_be_hidden(state: MCodeState, request: Request) -> bool:
     """Whether another program's error would not show before a command: nothing of its replies comes here.
 
     A drive with EM=2 replies to no command, and one on a network only to the client that asks.
@@ -157,7 +157,7 @@ def find_again(state: MCodeState, request: Request) -> Procedure[None]:
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
     state.left_program_mode()
     if state.reply_pending:
-        yield from synchronise(state, request.priority)
+        yield from discard_late_replies(state, request.priority)
     state.synchronised()
     if state.product and state.codec != before:
         state.note(
@@ -202,7 +202,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
     if not (state.codec.party == form.party and (state.codec.checksum > 0) == (form.checksum > 0)):
         return None
     if state.error:
-        yield from refused(state, request)
+        yield from raise_refusal(state, request)
     raise unanswered(who(state), request)
 
 

@@ -27,7 +27,7 @@ from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.errors import described
 from multidrop.families.lexium.host.mcode.before_request import before_request
 from multidrop.families.lexium.host.mcode.exchange import (
-    REPEATS,
+    NAK_REPEATS,
     ends_in_program_mode,
     leave_program,
     read_error,
@@ -265,7 +265,7 @@ def _needs_own_echo(text: str) -> bool:
 def _stored(state: MCodeState, request: Request) -> Procedure[None]:
     """Store a line in program mode, or end program mode with PG. `request` is of the kind PROGRAM."""
     leaving = request.text.upper() == "PG"
-    for _ in range(1 + REPEATS):
+    for _ in range(1 + NAK_REPEATS):
         reply = yield request
         if reply.end is End.NAK and not leaving:
             yield from _again_at(state, request)
@@ -286,7 +286,7 @@ def _stored(state: MCodeState, request: Request) -> Procedure[None]:
             why = described(code, state) if code else "its error register gives no reason"
             raise Refused(f"{who(state)} refused '{request.text}': {why}")
         raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
-    raise NoAnswer(f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times; check the cabling")
+    raise NoAnswer(f"{who(state)}: '{request.text}' arrived damaged {1 + NAK_REPEATS} times; check the cabling")
 
 
 def _again_at(state: MCodeState, request: Request) -> Procedure[None]:

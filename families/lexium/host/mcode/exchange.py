@@ -23,9 +23,9 @@ from multidrop.families.lexium.manual.errors import ErrorNumber
 #
 # Theory of operation. A reply carries neither its request's number nor a name. So the host appends an item to the
 # values: the drive's own name (`PR P,DN`) if the drive prints it, otherwise a text with that name (`PR P,"~a"`). The
-# first is better. A flipped bit may turn one drive's name into another's: that drive prints any text that it receives,
-# but its own name. A sync mark also has a fresh number; everything before it is late. (MCode reference 5.1.33,
-# 5.1.102; decision 0014.)
+# first is better: a flipped bit in a request's address may send it to another drive. That drive prints a text exactly
+# as it receives it, so the text would pass, but for `DN` it prints its own name. A sync mark also has a fresh number;
+# everything before it is late. (MCode reference 5.1.33, 5.1.102; decision 0014.)
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ def _sign(address: str, by_name: bool) -> Sign:
     return Sign(f'"{text}"', text)
 
 
-def fresh(state: MCodeState, address: str, party: bool) -> Sign:
-    """Return a sync mark: the signature of a drive at this address, with a fresh number."""
+def fresh_mark(state: MCodeState, address: str, party: bool) -> Sign:
+    """Return a fresh sync mark: the signature of a drive at this address, with the next number."""
     number = state.next_sync_mark() % 10000
     if state.signs and party:
         return Sign(f'"~{number}",DN', f"~{number}{as_printed(address)}")
@@ -107,25 +107,28 @@ def signed(state: MCodeState, request: Request) -> Request:
 # reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
 
 
-REPEATS = 3
+NAK_REPEATS = 3
+"""How often a line is sent again that the drive rejected as damaged: a NAK, and ER=0."""
+QUESTION_REPEATS = 3
+"""How often the host asks again for what reading does not change, if the reply is damaged or missing."""
 UNKNOWN_WORDS = (ErrorNumber.UNKNOWN_VARIABLE, ErrorNumber.UNKNOWN_COMMAND)
 
 
-def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
+def send_until_answered(state: MCodeState, request: Request) -> Procedure[Reply]:
     """Send a request; repeat it only after a NAK with ER=0. Raises Refused or NoAnswer."""
-    for _ in range(1 + REPEATS):
-        stood = state.error
-        reply = yield from once(state, request)
+    for _ in range(1 + NAK_REPEATS):
+        flag_may_be_set = state.error
+        reply = yield from send_once(state, request)
         if not reply.doubtful:
             note_error(state, reply)
         if reply.end is End.NAK and not reply.doubtful:
-            yield from _refused_unless_damaged(state, request, stood)
+            yield from _raise_refusal_unless_damaged(state, request, flag_may_be_set)
             if reply.detail:
                 state.reply_lost()
                 raise unanswered(who(state), request, replace(reply, end=End.DAMAGED))
             continue
         if reply.end is End.REFUSED:
-            yield from refused(state, request)
+            yield from raise_refusal(state, request)
         if reply.end in (End.TIMEOUT, End.DAMAGED, End.NAK):  # the NAK may be another drive's
             state.reply_lost()
             raise unanswered(who(state), request, reply)
@@ -135,7 +138,8 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
                 f"{who(state)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
                 "executed; leave program mode with PG"
             )
-        # Discard a sign of acceptance, and refuse a print, where another drive's reply is outstanding.
+        # While the reply of another drive is outstanding, this one may be that. So an unsigned reply proves nothing: do
+        # not count it as an acknowledgement, and do not show what it prints.
         if not reply.doubtful or request.signed:
             return reply
         if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
@@ -146,12 +150,16 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
             )
         return replace(reply, acknowledged=False)
     raise NoAnswer(
-        f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
+        f"{who(state)}: '{request.text}' arrived damaged {1 + NAK_REPEATS} times and was not executed; check the "
+        "cabling"
     )
 
 
-def once(state: MCodeState, request: Request) -> Procedure[Reply]:
-    """Send a request once. Without a checksum noise may have made another of it, whose error a stop leaves unread."""
+def send_once(state: MCodeState, request: Request) -> Procedure[Reply]:
+    """Send a request once.
+
+    Without a checksum, noise may change the request into another one. If a stop cuts it off, that error stays unread.
+    """
     try:
         return (yield request)
     except Stopped:
@@ -160,10 +168,13 @@ def once(state: MCodeState, request: Request) -> Procedure[Reply]:
         raise
 
 
-def attempted(state: MCodeState, request: Request) -> Procedure[Reply]:
-    """Send a person's line as `answered` does. A stop that cuts it off leaves its error, if any, in the drive."""
+def send_persons_line(state: MCodeState, request: Request) -> Procedure[Reply]:
+    """Send a person's line as `send_until_answered` does.
+
+    If a stop cuts it off, the error flag may stay set: nothing has read it.
+    """
     try:
-        return (yield from answered(state, request))
+        return (yield from send_until_answered(state, request))
     except Stopped:
         state.error_possible()
         raise
@@ -189,43 +200,46 @@ def check_printed(state: MCodeState, reply: Reply, refusal: str = "") -> None:
 
 def printed_value(state: MCodeState, items: str, form: str) -> Procedure[str]:
     """Print values for the host's own use. Raises NoAnswer where nothing is printed, Refused."""
-    reply = yield from answered(state, question(state, items, form))
+    reply = yield from send_until_answered(state, question(state, items, form))
     check_printed(state, reply)
     return value(state, reply)
 
 
-def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) -> Procedure[None]:
+def _raise_refusal_unless_damaged(state: MCodeState, request: Request, flag_may_be_set: bool) -> Procedure[None]:
     """Tell a damaged frame (ER=0) from a refusal after a NAK, unless the error may be an earlier one.
 
-    `stood`: the flag was set, or not known to be clear, when the request was sent.
+    `flag_may_be_set`: the flag was set, or not known to be clear, when the request was sent.
     """
-    heard = state.others_heard
+    others_heard = state.others_heard
     code, acknowledged = yield from _read_error(state)
-    once = f"it is not known whether '{request.text}' was executed; it was sent once"
+    outcome_unknown = f"it is not known whether '{request.text}' was executed; it was sent once"
     if acknowledged:  # by the drive, late: the NAK was noise
-        raise NoAnswer(f"{who(state)} replied NAK, and an ACK came later: {once}")
+        raise NoAnswer(f"{who(state)} replied NAK, and an ACK came later: {outcome_unknown}")
     if code == 0:
         return
     if code is None:
-        raise NoAnswer(f"{who(state)} replied NAK, and the reason could not be read: {once}")
-    _check_cause(state, request, code, heard)
+        raise NoAnswer(f"{who(state)} replied NAK, and the reason could not be read: {outcome_unknown}")
+    _check_cause(state, request, code, others_heard)
     if request.kind not in (Kind.PRINT, Kind.LIST):
-        if stood or _came_by_itself(request, code):
-            raise NoAnswer(f"{who(state)} replied NAK, maybe for {described(code, state)}, now cleared: {once}")
+        if flag_may_be_set or _came_by_itself(request, code):
+            raise NoAnswer(
+                f"{who(state)} replied NAK, maybe for {described(code, state)}, now cleared: {outcome_unknown}"
+            )
         if (yield from _runs(state)):
             raise NoAnswer(
-                f"{who(state)} replied NAK, and {described(code, state)} may be its running program's: {once}"
+                f"{who(state)} replied NAK, and {described(code, state)} may be its running program's: "
+                f"{outcome_unknown}"
             )
     raise Refused(f"{who(state)} refused '{request.text}': {described(code, state)}", code)
 
 
-def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> Procedure[None]:
+def raise_refusal(state: MCodeState, request: Request, acknowledged: bool = False) -> Procedure[None]:
     """Read and raise the error after `?` or EF=1.
 
     The error need not come from this line: a limit, a stall or the running program sets EF too. `acknowledged`: an ACK
     of the line came late.
     """
-    heard = state.others_heard
+    others_heard = state.others_heard
     code = yield from read_error(state)
     if not code:
         gone = "could not be read" if code is None else "is gone from ER; a subroutine of OE may have read it"
@@ -237,7 +251,7 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
             f"{who(state)}: {described(code, state)}, now cleared; an ACK of '{request.text}' came, too: it is not "
             "known whether it was executed"
         )
-    _check_cause(state, request, code, heard)
+    _check_cause(state, request, code, others_heard)
     # A drive may lack a variable that the manual has.
     elsewhere = code in UNKNOWN_WORDS and not classify.uses_own_name(request.text)
     if elsewhere or _came_by_itself(request, code):
@@ -252,17 +266,18 @@ def refused(state: MCodeState, request: Request, acknowledged: bool = False) -> 
     raise Refused(refusal, code, certain=not caveat or classify.refused_by_tables(request.text, state.product))
 
 
-def _check_cause(state: MCodeState, request: Request, code: int, heard: bool) -> None:
+def _check_cause(state: MCodeState, request: Request, code: int, others_heard: bool) -> None:
     """Raise NoAnswer for an error that is another line's, or may be.
 
     Another program has sent that line, on the same port or the same drives, or noise has made it of ours. A port that
-    is lent makes a half-sent line harmless. `heard`: bytes came without a request since the flag was known to be clear.
+    is lent makes a half-sent line harmless. `others_heard`: bytes came without a request since the flag was known to be
+    clear.
     """
     if classify.refused_by_tables(request.text, state.product):
         return
     if not classify.may_cause(request.text, code, state.product):
         why = f"which '{request.text}' cannot cause: another program may use the line, or it was disturbed"
-    elif heard and not state.running:
+    elif others_heard and not state.running:
         why = "and bytes came without a question: another program may use the line"
     else:
         return
@@ -294,7 +309,7 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
     state.error_possible()  # until it is read: a stop may come in between
     asked = question(state, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
     try:
-        reply = yield from answered(state, asked)
+        reply = yield from send_until_answered(state, asked)
     except NoAnswer:
         raise unanswered(who(state), request) from None
     if reply.end is End.SILENT:
@@ -312,7 +327,7 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
         state.came_unasked()
     late = silent and surplus
     if printed[:1] == "1":
-        yield from refused(state, request, acknowledged=late and state.codec.checksum > 0)
+        yield from raise_refusal(state, request, acknowledged=late and state.codec.checksum > 0)
     state.error_flag_read(False)
     runs, ends = printed[1:] == " 1", classify.word_of(request.text)[0] == "E"
     taken = not runs if ends else runs and state.codec.checksum == 2
@@ -338,7 +353,7 @@ def read_error(state: MCodeState) -> Procedure[int | None]:
 def _read_error(state: MCodeState) -> Procedure[tuple[int | None, bool]]:
     """Read ER, and whether the ACK of the request before it came late, or may have been taken for another drive's."""
     request, late = question(state, "ER", INTEGER), False
-    for _ in range(1 + REPEATS):
+    for _ in range(1 + QUESTION_REPEATS):
         reply = yield request
         late = late or reply.surplus or reply.doubtful
         if reply.end is End.NAK and not reply.detail:
@@ -352,29 +367,32 @@ def _read_error(state: MCodeState) -> Procedure[tuple[int | None, bool]]:
     return None, late
 
 
-def synchronise(state: MCodeState, priority: Priority) -> Procedure[bool]:
-    """Print a mark after a lost reply. What comes before it is a program's, or late: it belongs to no request."""
-    return (yield from print_mark(state, priority, rows=NOTHING)) is not None
+def discard_late_replies(state: MCodeState, priority: Priority) -> Procedure[bool]:
+    """Have the drive print a fresh mark after a lost reply; return whether the mark came.
+
+    What comes before the mark is late or printed by a program: it belongs to no request.
+    """
+    return (yield from mark_printed(state, priority, rows=NOTHING))
 
 
-def mark(state: MCodeState, request: Request) -> Procedure[None]:
-    """Print a sync mark: everything received before it is late."""
-    if not (yield from synchronise(state, request.priority)):
+def require_mark(state: MCodeState, request: Request) -> Procedure[None]:
+    """Do as `discard_late_replies`, for `request`. Raises NoAnswer if the mark does not come."""
+    if not (yield from discard_late_replies(state, request.priority)):
         state.reply_lost()
         fate = "was sent once" if request.kind is Kind.PRINT and state.codec.em == 2 else "was not sent"
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' {fate}")
     state.synchronised()
 
 
-def print_mark(state: MCodeState, priority: Priority, rows: str | None = None) -> Procedure[tuple[str, ...] | None]:
-    """Have the drive print a fresh mark; return the lines up to the mark, or None. `rows`: as for a Request."""
-    reply = yield _mark(state, priority, rows)
-    return reply.lines if reply.end is End.DONE else None
+def mark_printed(state: MCodeState, priority: Priority, rows: str | None = None) -> Procedure[bool]:
+    """Have the drive print a fresh mark; return whether the mark came. `rows`: as for a Request."""
+    reply = yield _mark_request(state, priority, rows)
+    return reply.end is End.DONE
 
 
 def rest_of_list(state: MCodeState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
     """Have the drive print a fresh mark after a list; return the lines before it, or None where some may be missing."""
-    reply = yield _mark(state, priority)
+    reply = yield _mark_request(state, priority)
     if reply.end is not End.DONE or reply.collided:  # a damaged line may be one of the list
         state.reply_lost()
         return None
@@ -386,8 +404,9 @@ def lacks_lines(reply: Reply, lines: Iterable[str]) -> bool:
     return bool(reply.collided) or any(UNPRINTED.search(line) for line in lines)
 
 
-def _mark(state: MCodeState, priority: Priority, rows: str | None = None) -> Request:
-    own = fresh(state, state.address, state.codec.party)
+def _mark_request(state: MCodeState, priority: Priority, rows: str | None = None) -> Request:
+    """Return the request that has the drive print a fresh mark."""
+    own = fresh_mark(state, state.address, state.codec.party)
     asked = state.codec.request(state.address, f"PR {own.item}")
     return replace(asked, expect=re.escape(own.shown), gather=True, rows=rows, signed=True, priority=priority)
 
@@ -402,6 +421,8 @@ def ends_in_program_mode(reply: Reply) -> bool:
 
 NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
 """The error of PG alone outside of program mode (section 10)."""
+MOST_PG_SENT = 6
+"""How often PG is sent at most to leave program mode."""
 
 
 def leave_program(state: MCodeState) -> Procedure[int]:
@@ -409,7 +430,7 @@ def leave_program(state: MCodeState) -> Procedure[int]:
 
     Returns the error that this found and cleared, 0 for none.
     """
-    for sent in range(2 * REPEATS):
+    for sent in range(MOST_PG_SENT):
         request = replace(state.codec.request(state.address, "PG"), kind=Kind.PROGRAM)
         reply = yield request
         code: int | None = 0
@@ -422,7 +443,7 @@ def leave_program(state: MCodeState) -> Procedure[int]:
             if code:
                 state.left_program_mode()
         else:
-            if (yield from print_mark(state, request.priority)) is not None:
+            if (yield from mark_printed(state, request.priority)):
                 state.left_program_mode()
         if not state.programming:
             if sent and not code:  # the error of a PG too many, which may be late

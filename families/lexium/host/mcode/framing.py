@@ -93,23 +93,23 @@ def printable(data: bytes) -> str:
     return data.replace(CR, b"").decode("latin-1")
 
 
-def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], int]:
+def unasked(buffer: bytes, echo_mode: int, checksum_mode: int) -> tuple[tuple[str, ...], int]:
     """Whole lines received while no request was open, without prompts, and how many bytes they took."""
-    if checksum == 0:
+    if checksum_mode == 0:
         # Whole lines without checksum, all at once: a program may print a thousand at a time.
         used = buffer.rfind(LF) + 1
         if buffer.isascii():
             lines = printable(buffer[:used]).split("\n")
         else:
             lines = [printable(stripped(line.replace(CR, b""))) for line in buffer[:used].split(LF)]
-        if echo == 0:
+        if echo_mode == 0:
             lines = [line[1:] if line.startswith((">", "?")) else line for line in lines]
             if buffer[used:].replace(CR, b"") in (b">", b"?"):
                 used = len(buffer)
         return tuple(filter(None, lines)), used
     used, lines = 0, []
-    for piece in pieces(buffer, 0, checksum != 0):
-        prompt = echo == 0 and piece.shown[:1] in (b">", b"?")
+    for piece in pieces(buffer, 0, checksum_mode != 0):
+        prompt = echo_mode == 0 and piece.shown[:1] in (b">", b"?")
         if piece.what == "rest" and not (prompt and len(piece.shown) == 1):
             break
         used, data = piece.end, piece.data

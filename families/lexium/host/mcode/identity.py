@@ -21,7 +21,13 @@ from multidrop.dialects.state import who
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.classify import NOTHING, LineSetting
 from multidrop.families.lexium.host.mcode.codec import NOBODY, MCode
-from multidrop.families.lexium.host.mcode.exchange import answered, as_printed, fresh, refused, take_out
+from multidrop.families.lexium.host.mcode.exchange import (
+    as_printed,
+    fresh_mark,
+    raise_refusal,
+    send_until_answered,
+    take_out,
+)
 from multidrop.families.lexium.host.mcode.framing import NAK, sealed
 from multidrop.families.lexium.host.mcode.quiet import PONG, SLOWEST_BYTES_A_SECOND, pongs
 from multidrop.families.lexium.host.mcode.state import MCodeState, ReplyPlace
@@ -140,7 +146,7 @@ def asked(
     state: MCodeState, address: str, form: MCode, items: str, pattern: str, priority: Priority = Priority.OPERATOR
 ) -> Procedure[tuple[str, Reply]]:
     """Have a drive print values and a mark, readable in any EM; return an empty text where it is not received."""
-    mark = fresh(state, address, form.party)
+    mark = fresh_mark(state, address, form.party)
     expect = f"({pattern}){re.escape(mark.shown)}"
     text = f"PR {items},{mark.item}"
     timeout = BRIEF + len(text) / SLOWEST_BYTES_A_SECOND
@@ -175,7 +181,7 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
     assert setting is not None
     places, before, replied = places_after(state, setting), who(state), False
     try:
-        yield from answered(state, request)
+        yield from send_until_answered(state, request)
         replied = yield from look_in(state, places)
     finally:
         if not replied:  # stopped or lost before the settings were read, or an error that need not come from this line
@@ -183,7 +189,7 @@ def set_wire(state: MCodeState, request: Request) -> Procedure[None]:
     if not replied:
         raise NoAnswer(f"{before} was sent '{request.text}' and does not reply now; open it again later")
     if state.error:
-        yield from refused(state, request)
+        yield from raise_refusal(state, request)
     if setting.name == "FD":
         state.named(UNNAMED)
         state.remark(f"{before}: factory defaults: EM=0, PY=0, CK=0, name !")

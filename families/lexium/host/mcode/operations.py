@@ -54,7 +54,7 @@ def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, .
     request = replace(request, codec=state.codec)
     state.may_be_in_program_mode()  # until the reply shows it: no other line may slip in
     try:
-        reply = yield from exchange.answered(state, request)
+        reply = yield from exchange.send_until_answered(state, request)
         if not exchange.ends_in_program_mode(reply):
             raise Refused(f"{who(state)} did not go into program mode after '{request.text}'")
     except Refused:
@@ -94,7 +94,7 @@ def serial_number(state: MCodeState) -> Procedure[str]:
     if not (state.product.startswith("LM") or mode.party or mode.checksum):
         return ""
     try:
-        reply = yield from exchange.answered(state, exchange.question(state, "SN", "[!-~][ -~]*"))
+        reply = yield from exchange.send_until_answered(state, exchange.question(state, "SN", "[!-~][ -~]*"))
     except Refused:
         return ""
     if reply.end is not End.DONE:
@@ -257,7 +257,7 @@ def written(text: str) -> tuple[str, int] | None:
 
 def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
     try:
-        reply = yield from exchange.answered(state, exchange.question(state, items, form))
+        reply = yield from exchange.send_until_answered(state, exchange.question(state, items, form))
     except (NoAnswer, Refused):
         return []
     if not reply.lines:
@@ -334,7 +334,7 @@ class MCodeOperations(LexiumOperations):
         target = classify.target_of(request.text, state.rest)
         if displaces := classify.may_displace(request.text):
             state.heads_for(None)
-        reply = yield from exchange.attempted(state, request)
+        reply = yield from exchange.send_persons_line(state, request)
         if request.kind is Kind.LIST:
             # Print a mark after a list: EM 1 to 3 give a list no end.
             lines = reply.lines
@@ -359,12 +359,12 @@ class MCodeOperations(LexiumOperations):
         """Send a person's print, signed so that no other line is taken for it."""
         state = self.state
         request = exchange.signed(state, request)
-        reply = yield from exchange.attempted(state, request)
+        reply = yield from exchange.send_persons_line(state, request)
         if reply.end is End.SILENT:
             # Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent).
             if state.codec.em == 2:
                 state.reply_outstanding()
-                yield from exchange.mark(state, request)
+                yield from exchange.require_mark(state, request)
             yield from exchange.check_error_flag(state, request)
             if not classify.may_be_blank(request.text, request.expect):
                 raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
@@ -388,7 +388,7 @@ class MCodeOperations(LexiumOperations):
         refuse_in_program(state, "ask again")
         yield from before_request(state, _motion(state.codec, state.address, exchange.sign(state), priority))
         request = _motion(state.codec, state.address, exchange.sign(state), priority)
-        reply = yield from exchange.once(state, request)
+        reply = yield from exchange.send_once(state, request)
         exchange.check_printed(state, reply)
         match = re.fullmatch(request.expect or "", reply.text)
         assert match is not None

@@ -17,7 +17,7 @@ from multidrop.dialects.program_files import Held, Stored
 from multidrop.dialects.state import who
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE
-from multidrop.families.lexium.host.mcode.exchange import REPEATS
+from multidrop.families.lexium.host.mcode.exchange import QUESTION_REPEATS
 from multidrop.families.lexium.host.mcode.operations import MCodeOperations
 from multidrop.families.lexium.host.mcode.settings import listed
 from multidrop.families.lexium.host.mcode.state import MCodeState
@@ -170,7 +170,7 @@ T = TypeVar("T")
 
 def _again(state: MCodeState, ask: Callable[[], Procedure[T]]) -> Procedure[T]:
     """Ask again after a damaged reply: these questions change nothing. A drive that is silent is not asked again."""
-    for _ in range(REPEATS):
+    for _ in range(QUESTION_REPEATS):
         try:
             return (yield from ask())
         except NoAnswer:

@@ -24,7 +24,7 @@ from multidrop.families.lexium.manual.groups import SLOW
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
-SHORTEST_REQUEST_TIME, BETWEEN = 0.4, 0.06
+SHORTEST_REQUEST_TIME, WITHIN_REPLY = 0.4, 0.06
 SLOWEST_BYTES_A_SECOND = 90.0
 """Characters a second on a line of 1200 baud after a gateway, where the host does not know the baud rate."""
 PONG = 0.15
@@ -186,9 +186,9 @@ def _always(received: Received) -> bool:
 COLLECTION = (
     QuietRow(lambda it: it.is_whole, AT_ONCE),
     QuietRow(lambda it: it.has_expected_line, SHORT),
-    QuietRow(lambda it: it.expected is not None, BETWEEN),
+    QuietRow(lambda it: it.expected is not None, WITHIN_REPLY),
     QuietRow(lambda it: it.is_pong, AT_ONCE),
-    QuietRow(lambda it: bool(it.buffer), BETWEEN),
+    QuietRow(lambda it: bool(it.buffer), WITHIN_REPLY),
     QuietRow(lambda it: bool(it.request.text), lambda it: it.sending_time),
     QuietRow(_always, PONG),
 )

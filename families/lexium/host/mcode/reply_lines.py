@@ -47,9 +47,9 @@ def _is_piece(request: Request, line: str) -> bool:
 class ReplyLines:
     """What a drive with these settings has sent since a request: printed lines, strays, ACKs and NAKs."""
 
-    def __init__(self, request: Request, echo: int, sealed: int, frame: bytes) -> None:
-        self.request, self.echo, self.sealed, self.frame = request, echo, sealed, frame
-        self.signs_off = sealed > 0 and echo != 2
+    def __init__(self, request: Request, echo_mode: int, checksum_mode: int, frame: bytes) -> None:
+        self.request, self.echo_mode, self.checksum_mode, self.frame = request, echo_mode, checksum_mode, frame
+        self.signs_off = checksum_mode > 0 and echo_mode != 2
         """The drive sends ACK or NAK with its reply."""
         self.lines: list[str] = []
         self.strays: list[str] = []
@@ -64,7 +64,7 @@ class ReplyLines:
 
     def add_earlier(self, data: bytes) -> None:
         """Add a line from before the reply: part of it where the request gathers it, otherwise a stray."""
-        plain = unsealed(data) if self.sealed else stripped(data)
+        plain = unsealed(data) if self.checksum_mode else stripped(data)
         if plain is None:
             self.collided.append(printable(data))
         else:
@@ -81,7 +81,7 @@ class ReplyLines:
 
     def add_glued(self, piece: ReplyPiece) -> None:
         """Sort text before an ACK or NAK: EM=3's repetition of the request, or an incomplete line."""
-        if self.echo == 3 and not self.repeated and self.repetition(piece.shown) == len(piece.shown):
+        if self.echo_mode == 3 and not self.repeated and self.repetition(piece.shown) == len(piece.shown):
             self.repeated = True
             return
         self.mixed = True
@@ -109,11 +109,11 @@ class ReplyLines:
             self.restarted = True
             self.strays.append(line)
             return
-        if self.echo == 3 and not self.repeated and (size := self.repetition(plain)):
+        if self.echo_mode == 3 and not self.repeated and (size := self.repetition(plain)):
             self.repeated, data = True, plain[size:]
             if not data:
                 return
-        unsealed_text = unsealed(data) if self.sealed else stripped(data)
+        unsealed_text = unsealed(data) if self.checksum_mode else stripped(data)
         if unsealed_text is None:
             self.damaged = f"checksum of {printable(data)!r} is wrong"
             self.collided.append(printable(data))
@@ -135,7 +135,7 @@ class ReplyLines:
         """
         text = (self.request.spoken or self.request.text).encode("latin-1")
         whole = [words + self.check_byte(frame) for words in (self.frame, text) for frame in (self.frame, text)]
-        if self.sealed:
+        if self.checksum_mode:
             return next((len(line) for line in whole if data.startswith(line)), 0)
         return len(data) if data in whole else 0
 
@@ -161,7 +161,7 @@ class ReplyLines:
     @property
     def announced(self) -> bool:
         """Whether the reply can have begun: with CK=1 it follows ACK or NAK."""
-        return self.sealed != 1 or self.echo == 2 or self.signed_off
+        return self.checksum_mode != 1 or self.echo_mode == 2 or self.signed_off
 
     @property
     def signed_off(self) -> bool:
@@ -170,11 +170,11 @@ class ReplyLines:
     @property
     def repetition_missing(self) -> bool:
         """Whether the repetition of the request (EM=3) is still missing."""
-        return self.echo == 3 and not self.repeated
+        return self.echo_mode == 3 and not self.repeated
 
     def complete(self) -> bool:
         kind = self.request.kind
-        if kind in ENDLESS or self.echo == 0:
+        if kind in ENDLESS or self.echo_mode == 0:
             return False
         if kind is Kind.PRINT:
             return self.answered and (self.signed_off or not self.signs_off)
@@ -182,13 +182,13 @@ class ReplyLines:
             return False
         if self.signs_off:
             return self.acks > 0
-        return {1: self.blanks > 0, 3: True}.get(self.echo, False)
+        return {1: self.blanks > 0, 3: True}.get(self.echo_mode, False)
 
     def silence_is_success(self, rest: bytes) -> bool:
         """Whether a drive with these settings may execute a command without any sign, while its program runs."""
-        if self.echo == 3:
-            return self.sealed == 2 and (self.repeated or 0 < len(rest) == self.repetition(rest))
-        return self.echo == 2 or self.sealed != 1
+        if self.echo_mode == 3:
+            return self.checksum_mode == 2 and (self.repeated or 0 < len(rest) == self.repetition(rest))
+        return self.echo_mode == 2 or self.checksum_mode != 1
 
     def decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
         """Return the reply as collected, with its end after a last check."""
@@ -249,4 +249,4 @@ class ReplyLines:
 
     def check_byte(self, frame: bytes) -> bytes:
         """The check byte of a frame; empty where the drive uses none."""
-        return bytes([checksum(frame)]) if self.sealed else b""
+        return bytes([checksum(frame)]) if self.checksum_mode else b""

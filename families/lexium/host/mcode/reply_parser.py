@@ -38,27 +38,28 @@ from multidrop.families.lexium.host.mcode.reply_lines import ENDLESS, ReplyLines
 
 
 PROMPTS = (b">", b"?")
-WAITED = 2
-"""Whole lines of a running program that replace a quiet time."""
+LINES_FOR_QUIET = 2
+"""Whole lines of a running program that are accepted instead of a quiet time, which may never come."""
 
 
 class ReplyParser:
     """One pass over a reply, until it is complete."""
 
-    def __init__(self, request: Request, echo: int, sealed: int, frame: bytes, buffer: bytes) -> None:
-        self.request, self.echo, self.sealed, self.frame, self.buffer = request, echo, sealed, frame, buffer
-        self.got = ReplyLines(request, echo, sealed, frame)
+    def __init__(self, request: Request, echo_mode: int, checksum_mode: int, frame: bytes, buffer: bytes) -> None:
+        self.request, self.frame, self.buffer = request, frame, buffer
+        self.echo_mode, self.checksum_mode = echo_mode, checksum_mode
+        self.got = ReplyLines(request, echo_mode, checksum_mode, frame)
         self.began = False
         self.rest = b""
         self.rest_at = len(buffer)
         self.candidate: tuple[bytes, int, int, str] | None = None
         """A prompt that may begin a print: its text and position, the number of strays and the damage before it."""
-        self.after = 0
+        self.lines_since_sign = 0
         """Whole lines received since a NAK, such a prompt or the reply: anything that follows it would have arrived."""
 
     def whole(self) -> Decoded | None:
         start = 0
-        if self.echo == 0 and self.request.kind is not Kind.QUIET:
+        if self.echo_mode == 0 and self.request.kind is not Kind.QUIET:
             rest = after_echo(self.frame, self.got.check_byte(self.frame), self.buffer)
             if rest is None:
                 return None
@@ -67,7 +68,7 @@ class ReplyParser:
                 if line := line.lstrip(b">"):
                     self.got.add_earlier(line)
         self.began = True
-        for piece in pieces(self.buffer, start, self.sealed != 0):
+        for piece in pieces(self.buffer, start, self.checksum_mode != 0):
             if (done := self._take(piece)) is not None:
                 return done
         return None
@@ -85,17 +86,17 @@ class ReplyParser:
         elif (prompt := self._prompt_before(piece)) is not None:
             return self._at_prompt(prompt, piece.start)
         else:
-            self.after += bool(self.got.naks or self.candidate or self.got.answered)
+            self.lines_since_sign += bool(self.got.naks or self.candidate or self.got.answered)
             self.got.add_line(piece.data)
-            if self.after == WAITED:
+            if self.lines_since_sign == LINES_FOR_QUIET:
                 # Accept a doubtful sign after other lines, with nothing against it, as after a quiet time.
                 if self.request.kind in ENDLESS:
                     return None
-                if self.echo == 0:
+                if self.echo_mode == 0:
                     return self._at_candidate()
                 if self.got.naks:
                     return self.got.decoded(self._after_nak(), piece.end)
-                if self.got.answered and self.sealed == 2:  # with CK=1 the ACK still follows
+                if self.got.answered and self.checksum_mode == 2:  # with CK=1 the ACK still follows
                     return self.got.decoded(End.DONE, piece.end)
                 return None
         return self.got.decoded(End.DONE, piece.end) if self.got.complete() else None
@@ -104,10 +105,10 @@ class ReplyParser:
 
     @property
     def _at_end(self) -> bool:
-        if self.echo != 0 or self.request.kind in (Kind.SETTING, Kind.QUIET):
+        if self.echo_mode != 0 or self.request.kind in (Kind.SETTING, Kind.QUIET):
             return False
         return (
-            self.got.blanks > 0 or self.got.signed_off or self.sealed == 2
+            self.got.blanks > 0 or self.got.signed_off or self.checksum_mode == 2
         )  # with CK=2 a running program leaves no sign
 
     def _surely_prompt(self, rest: bytes) -> bool:
@@ -141,7 +142,7 @@ class ReplyParser:
             return None
         if data[:1] == b">" and len(data) == 2:
             return b">"
-        if self.sealed and (unsealed(data) is not None or unsealed(data[1:]) is None):
+        if self.checksum_mode and (unsealed(data) is not None or unsealed(data[1:]) is None):
             return None  # its check byte shows a print, or a damaged line
         self.candidate = self.candidate or (data[:1], piece.start, len(self.got.strays), self.got.damaged)
         return None
@@ -151,9 +152,9 @@ class ReplyParser:
         printed = self.got.answered or (self.request.kind is Kind.LIST and self.got.lines)
         if prompt == b"?" and not printed and not self.got.acks and end is End.DONE:
             end = End.REFUSED  # after an ACK the error is an earlier one
-        elif end is End.DONE and self.sealed and not self.got.acks:
+        elif end is End.DONE and self.checksum_mode and not self.got.acks:
             # With a checksum a prompt does not prove execution, since it also follows a NAK.
-            if self.request.kind is Kind.COMMAND and self.sealed == 2:
+            if self.request.kind is Kind.COMMAND and self.checksum_mode == 2:
                 end = End.SILENT  # a program may be running
             elif self.request.kind in (Kind.COMMAND, Kind.PROGRAM):
                 end, self.got.damaged = End.DAMAGED, self.got.damaged or "neither ACK nor NAK came"
@@ -177,8 +178,8 @@ class ReplyParser:
         if got.answered and self.request.kind is Kind.PRINT:
             return End.DONE
         other_signs = got.acks or got.mixed or got.damaged or got.answered or got.repetition_missing
-        if got.naks == 1 and not other_signs and not (self.rest and self.echo != 0):
-            if self.after > 0 and self.echo != 0:
+        if got.naks == 1 and not other_signs and not (self.rest and self.echo_mode != 0):
+            if self.lines_since_sign > 0 and self.echo_mode != 0:
                 got.damaged = "prints follow the NAK"
             return End.NAK
         got.damaged = got.damaged or "NAK among other characters"
@@ -195,23 +196,23 @@ class ReplyParser:
             return self._quiet_list()
         if kind in ENDLESS:
             return self._ended_by_quiet(self._quiet_prompt())
-        if self.echo == 0:
+        if self.echo_mode == 0:
             return self._settled_prompt(len(self.buffer)) if self.began else None
         return self._quiet_print() if kind is Kind.PRINT else self._quiet_command()
 
     def _quiet_prompt(self) -> str:
         """The prompt that came last with EM=0; empty: none, or the address of a listed line, whose rest is late."""
-        if self.echo != 0 or not self._is_prompt(self.rest):
+        if self.echo_mode != 0 or not self._is_prompt(self.rest):
             return ""
         listing = self.request.kind is Kind.LIST and classify.word_of(self.request.text)[0] == "L"
         return "" if self.rest not in PROMPTS and (self.got.lines or listing) else printable(self.rest)
 
     def _quiet_list(self) -> Decoded | None:
         """Decide a list: its prompt ends it with EM=0, a quiet wire after a whole line otherwise."""
-        if self.echo == 3 and not self.got.repeated:
+        if self.echo_mode == 3 and not self.got.repeated:
             return None
         prompt = self._quiet_prompt()
-        unended = self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
+        unended = self.echo_mode == 0 or bool(self.rest and not self.request.text.endswith(";"))
         if not prompt and unended:  # its prompt is missing, or the end of a line
             return None
         return self._ended_by_quiet(prompt)
@@ -236,7 +237,7 @@ class ReplyParser:
             got.add_unended(self.rest)
         if got.naks:
             return got.decoded(self._after_nak(), used)
-        if not got.answered and got.blanks and self.echo in (2, 3) and not request.expect:
+        if not got.answered and got.blanks and self.echo_mode in (2, 3) and not request.expect:
             got.answer("")
         if got.answered:
             return got.decoded(End.DONE, used)
@@ -253,7 +254,7 @@ class ReplyParser:
         used = len(self.buffer)
         if self.got.naks:
             return self.got.decoded(self._after_nak(), used)
-        if self.rest and self.echo != 3:
+        if self.rest and self.echo_mode != 3:
             used = self.rest_at  # half a line of another drive or a program, still to be completed
         return self.got.decoded(End.SILENT, used) if self.got.silence_is_success(self.rest) else None
 

@@ -20,13 +20,13 @@ from multidrop.dialects.values import (
 from multidrop.families.lexium.host.mcode.before_request import before_request
 from multidrop.families.lexium.host.mcode.codec import EVERY_DRIVE
 from multidrop.families.lexium.host.mcode.exchange import (
-    REPEATS,
+    QUESTION_REPEATS,
     lacks_lines,
     note_error,
-    once,
     printed_value,
     question,
     rest_of_list,
+    send_once,
     sign,
     value,
 )
@@ -53,7 +53,7 @@ from multidrop.families.lexium.manual.table import words
 
 ETHERNET = ("LMDOE", "LMDCE")
 """The products without a name."""
-BETWEEN = ":"
+VALUE_SEPARATOR = ":"
 """Printed between two settings; no setting contains it."""
 NOT_PRINTED = "the drive refuses the line in which it is asked (PR ER shows why), or prints another form"
 USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re.I)
@@ -112,22 +112,22 @@ def items_and_forms(batch: Sequence[Mnemonic]) -> tuple[str, list[str]]:
     for before, row in zip([None, *batch], batch, strict=False):
         form = form_of(row)
         alone = before is None or (form_of(before) is SettingForm.DIGIT and form is SettingForm.DIGIT)
-        items += ("" if before is None else "," if alone else f',"{BETWEEN}",') + row.name
-        forms.append(f"{'' if alone else BETWEEN}{form.value}")
+        items += ("" if before is None else "," if alone else f',"{VALUE_SEPARATOR}",') + row.name
+        forms.append(f"{'' if alone else VALUE_SEPARATOR}{form.value}")
     return items, forms
 
 
 def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[list[str] | None]:
     """Print values; None where the drive refuses to, or prints what is not understood. Raises NoAnswer."""
     answer = "".join(f"(?:{form})" for form in forms)
-    for _ in range(1 + REPEATS):
+    for _ in range(1 + QUESTION_REPEATS):
         yield from before_request(state, question(state, items, answer))
-        reply = yield from once(state, question(state, items, answer))
+        reply = yield from send_once(state, question(state, items, answer))
         if reply.end is End.DONE:
             note_error(state, reply)
             match = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
             assert match is not None
-            return [group.removeprefix(BETWEEN).strip() for group in match.groups()]
+            return [group.removeprefix(VALUE_SEPARATOR).strip() for group in match.groups()]
         if reply.end is End.REFUSED and not reply.doubtful:
             state.error_flag_read(True)
             return None
@@ -171,23 +171,23 @@ def list_request(state: MCodeState, word: str, numbers: Sequence[int]) -> Reques
 
 def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     """Print a list (`PR UV`, `L`) to its end. Raises NoAnswer where it may be incomplete."""
-    stood = state.error
-    for _ in range(1 + REPEATS):
+    flag_may_be_set = state.error
+    for _ in range(1 + QUESTION_REPEATS):
         yield from before_request(state, question(state, "EF", "[01]"))
-        reply = yield from once(state, state.codec.request(state.address, text))
+        reply = yield from send_once(state, state.codec.request(state.address, text))
         if reply.end in (End.REFUSED, End.NAK) or reply.prompt == "?":  # noise may have made another line of it
             state.error_possible()
         lines = reply.lines
         if state.codec.em != 0 or reply.end is not End.DONE:
             rest = yield from rest_of_list(state, Priority.OPERATOR)
             if rest is None or lacks_lines(reply, lines):
-                stood = True
+                flag_may_be_set = True
                 continue
             state.synchronised()
             lines += rest
         whole = reply.end in (End.DONE, End.SILENT)
         if reply.end in (End.REFUSED, End.NAK):  # an earlier error looks like the refusal of an empty list
-            whole = stood or (reply.end is End.NAK and bool(reply.lines))
+            whole = flag_may_be_set or (reply.end is End.NAK and bool(reply.lines))
         if whole:
             return tuple(line for line in lines if line)
     raise NoAnswer(f"{who(state)}: the list of '{text}' may be incomplete ({reply.end.value}); ask again")

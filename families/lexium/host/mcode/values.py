@@ -28,12 +28,12 @@ from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.families.lexium.host.mcode.exchange import (
     check_printed,
     note_error,
-    once,
     question,
+    send_once,
     value,
 )
 from multidrop.families.lexium.host.mcode.settings import (
-    BETWEEN,
+    VALUE_SEPARATOR,
     MCodeParameters,
     items_and_forms,
     list_request,
@@ -176,20 +176,20 @@ class MCodeValues(LexiumValues):
         items, forms = items_and_forms(batch)
         answer = "".join(f"(?:{form})" for form in forms)
         yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))
-        reply = yield from once(state, replace(question(state, items, answer), priority=Priority.POLL))
+        reply = yield from send_once(state, replace(question(state, items, answer), priority=Priority.POLL))
         check_printed(state, reply, REFUSAL)
         match = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
         assert match is not None
         facts: dict[str, Value] = {}
         for row, text in zip(batch, match.groups(), strict=True):
-            fields = tuple(int(number) for number in text.removeprefix(BETWEEN).split(","))
+            fields = tuple(int(number) for number in text.removeprefix(VALUE_SEPARATOR).split(","))
             facts[row.name] = fields if form_of(row) is SettingForm.FIELDS else fields[0]
         return facts
 
     def _list(self, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
         state = self.state
         yield from before_request(state, replace(question(state, "EF", "[01]"), priority=Priority.POLL))
-        reply = yield from once(state, replace(list_request(state, word, numbers), priority=Priority.POLL))
+        reply = yield from send_once(state, replace(list_request(state, word, numbers), priority=Priority.POLL))
         check_printed(state, reply, REFUSAL)
         rows = rows_of_list(word, numbers, reply.lines)
         if reply.doubtful or len(rows) < len(numbers):

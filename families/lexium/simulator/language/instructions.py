@@ -1,8 +1,8 @@
 """The table of MCode instructions: each compiles its statement into a closure that carries it out.
 
 `compile` is the one way from a statement to an action, for typed lines and program lines alike. What is wrong with the
-form of a line is raised as Fault when it is compiled; what is wrong with a value, when it runs. The instructions on
-programs are in `program_commands`, those of the motor and with several settings in `motor_commands`.
+form of a line is raised as DriveFault when it is compiled; what is wrong with a value, when it runs. The instructions
+on programs are in `program_commands`, those of the motor and with several settings in `motor_commands`.
 
 PR prints numbers, texts, and the lists of parameters, variables and set-ups. Manual 5.1.4, 5.1.64, 5.1.78, 5.1.93,
 5.1.97, 5.1.101, 5.1.102, 5.1.119, 5.1.122, 5.1.134, 5.1.141, 5.1.142.
@@ -70,7 +70,7 @@ class PrintInstruction:
         self._with_option: Mapping[str, Optional] = {"IT": self._temperature, "VT": self._voltage}
 
     def compile(self, statement: Statement) -> Action:
-        """PR. Raises Fault (35) for what cannot be printed."""
+        """PR. Raises DriveFault (35) for what cannot be printed."""
         items, emit = list(self._items(statement)), self._printer.emit
         ending = "" if statement.quiet else CRLF
         return lambda: emit("".join(item() for item in items) + ending)
@@ -249,7 +249,7 @@ class Instructions:
             return None
 
     def compile(self, statement: Statement, stored: bool) -> Action:
-        """Return a closure that carries a line out; `stored`: it is a program's. Raises Fault for a wrong line."""
+        """Return a closure that carries a line out; `stored`: it is a program's. Raises DriveFault for a wrong line."""
         word = statement.word
         if not word:
             return self.motions.counted(word, self._programs.number(statement))
@@ -302,7 +302,7 @@ class Instructions:
         return check
 
     def _step(self, by: int, statement: Statement) -> Action:
-        """IC and DC: add to a variable. Raises Fault (25, 26) for one that may not be stepped."""
+        """IC and DC: add to a variable. Raises DriveFault (25, 26) for one that may not be stepped."""
         target, variables = only(statement), self._variables
         if not isinstance(target, NameTerm):
             raise DriveFault(E.ILLEGAL_DATA)

@@ -112,7 +112,7 @@ class MotorCommands:
         self._motor.hmt.make_up(mode, clearing, self._timeline.now)
 
     def _test(self, statement: Statement) -> Action:
-        """SC 1. Raises Fault (24) without its number."""
+        """SC 1. Raises DriveFault (24) without its number."""
         if not statement.arguments:
             raise DriveFault(E.ILLEGAL_DATA)
 
@@ -177,7 +177,7 @@ class Setups:
         return self._variables.numbers(set_up, 1 if n == ANALOG else 2, fields)
 
     def _set_point(self, n: int, values: tuple[int, ...]) -> None:
-        """Make a point an input or an output. Raises Fault (6, 8, 21)."""
+        """Make a point an input or an output. Raises DriveFault (6, 8, 21)."""
         points, kind, active = self._points, values[0], values[1]
         if kind in points.output_types.get(n, ()):
             if any(values[2:]) and not points.sources:
@@ -259,13 +259,13 @@ class Setups:
         return define
 
     def _target(self, places: tuple[Argument | None, ...] | list[Argument | None], most: int) -> Argument | None:
-        """The subroutine of a trip; None for 0 and for none. Raises Fault (24)."""
+        """The subroutine of a trip; None for 0 and for none. Raises DriveFault (24)."""
         if len(places) > most or any(not is_place(place) for place in places[:1]):
             raise DriveFault(E.ILLEGAL_DATA)
         return None if not places or places[0] == Number(0) else places[0]
 
     def _check_trip(self, word: str, value: int, times: int) -> None:
-        """Check what a trip waits for. Raises Fault (10, 21)."""
+        """Check what a trip waits for. Raises DriveFault (10, 21)."""
         row = lookup(word, self._memory.product)
         if (row is not None and not row.accepts(value)) or not 0 <= times <= MOST_REPEATS:
             raise DriveFault(E.NO_SUCH_POINT if word == "TI" else E.OUT_OF_RANGE)

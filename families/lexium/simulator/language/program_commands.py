@@ -178,12 +178,12 @@ class ProgramCommands:
     # Program memory.
 
     def _check_unlocked(self) -> None:
-        """Raise Fault (44) while the program is locked (manual 5.1.75)."""
+        """Raise DriveFault (44) while the program is locked (manual 5.1.75)."""
         if self._memory.values["LK"]:
             raise DriveFault(E.PROGRAM_LOCKED)
 
     def _check_idle(self, moving: E) -> None:
-        """Raise Fault (41) while a program runs, and the given one while the motor moves."""
+        """Raise DriveFault (41) while a program runs, and the given one while the motor moves."""
         if self._thread.running:
             raise DriveFault(E.PROGRAM_RUNNING)
         if self._motor.status.moving(self._timeline.now):

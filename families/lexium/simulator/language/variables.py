@@ -1,8 +1,8 @@
 """The variables and flags of a simulated drive, and the forms of arguments that several instructions share.
 
 A plain variable is a number in memory with the range that the table of mnemonics gives it. The others have a reader or
-a writer. Compiled lines get closures from `reader` and `writer`, which raise Fault: 20 unknown, 21 wrong value, 25 read
-only, 30 not there, 32 a label, 35 cannot be read, 37 not in this drive.
+a writer. Compiled lines get closures from `reader` and `writer`, which raise DriveFault: 20 unknown, 21 wrong value, 25
+read only, 30 not there, 32 a label, 35 cannot be read, 37 not in this drive.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WATCHED = ("HC", "LD", "LG", "LT", "RC", "SM", "TD", "TQ", "WT", "CM")
 POINTS = (1, 2, 3, 4, 9, 10, 11, 12)
 """Inputs and outputs that bear a word each."""
 Compile = Callable[[Statement], Action]
-"""Compiles the statement of one instruction. Raises Fault for a wrong form."""
+"""Compiles the statement of one instruction. Raises DriveFault for a wrong form."""
 
 
 def is_place(argument: Argument | None) -> bool:
@@ -41,14 +41,14 @@ def is_place(argument: Argument | None) -> bool:
 
 
 def only(statement: Statement) -> Argument | None:
-    """The one argument. Raises Fault (24) for none or several."""
+    """The one argument. Raises DriveFault (24) for none or several."""
     if len(statement.arguments) != 1:
         raise DriveFault(E.ILLEGAL_DATA)
     return statement.arguments[0]
 
 
 def pair(statement: Statement) -> tuple[Argument | None, Argument | None]:
-    """One or two arguments. Raises Fault (24)."""
+    """One or two arguments. Raises DriveFault (24)."""
     if not 1 <= len(statement.arguments) <= 2:
         raise DriveFault(E.ILLEGAL_DATA)
     first, second = (*statement.arguments, None)[:2]
@@ -185,7 +185,7 @@ class Variables:
         return read
 
     def writer(self, word: str) -> Write:
-        """Return a closure that writes a variable, or raises Fault."""
+        """Return a closure that writes a variable, or raises DriveFault."""
         row, values = self._memory.row(word), self._values
         if row is None:
             return self._user_writer(word)
@@ -235,7 +235,7 @@ class Variables:
     # Arguments.
 
     def value(self, argument: Argument | None, floating: bool = False) -> Read:
-        """Return a closure that reads an argument's value. Raises Fault (21, 24) for what has none."""
+        """Return a closure that reads an argument's value. Raises DriveFault (21, 24) for what has none."""
         if isinstance(argument, Text):
             raise DriveFault(E.OUT_OF_RANGE)
         if argument is None or isinstance(argument, Compare):
@@ -243,7 +243,7 @@ class Variables:
         return self.compiler.expression(argument, floating)
 
     def numbers(self, act: Callable[[list[int]], None], least: int, most: int) -> Compile:
-        """An instruction with whole numbers: so many at least and at most. Raises Fault (24, 34, 38)."""
+        """An instruction with whole numbers: so many at least and at most. Raises DriveFault (24, 34, 38)."""
 
         def compiler(statement: Statement) -> Action:
             count = len(statement.arguments)
@@ -271,7 +271,7 @@ class Variables:
     # Velocities and resolution.
 
     def _set_velocity(self, name: str, number: int) -> None:
-        """VI or VM, in the unit of motion; VI stays below VM. Raises Fault (77, and the code of the word)."""
+        """VI or VM, in the unit of motion; VI stays below VM. Raises DriveFault (77, and the code of the word)."""
         values = self._values
         if not self._memory.counting:
             self._check_resolution(number)
@@ -282,7 +282,7 @@ class Variables:
         values[name] = number
 
     def _check_resolution(self, velocity: int) -> None:
-        """Raise Fault (77) for what this resolution does not reach, on products that have such a bound."""
+        """Raise DriveFault (77) for what this resolution does not reach, on products that have such a bound."""
         fastest = self._memory.model.per_microstep
         if fastest and velocity > self._values["MS"] * fastest:
             raise DriveFault(E.VELOCITY_TOO_HIGH)
@@ -313,9 +313,9 @@ class Variables:
         self._timeline.replan()
 
     def _check_ratio(self, changed: Mapping[str, Value]) -> None:
-        """Check that microsteps are fine enough for the encoder, two for a count (manual 5.1.38). Raises Fault (36).
+        """Check that microsteps are fine enough for the encoder, two for a count (manual 5.1.38).
 
-        A product whose MS is locked at its finest while it counts is always fine enough.
+        A product whose MS is locked at its finest while it counts is always fine enough. Raises DriveFault (36).
         """
         new = {**self._values, **changed}
         if self._memory.model.free_ms and new["MS"] * round(360 / new["SA"]) < new["EL"] * 8:
@@ -347,7 +347,7 @@ class Variables:
         memory, t = self._memory, self._timeline.now
         if number and not self._values["EE"]:
             self._check_ratio({})
-            # Check that VI is a count or more, on a product that has a code for less (5-21, 9). Raises Fault (90).
+            # Check that VI is a count or more, on a product that has a code for less (5-21, 9). Raises DriveFault (90).
             if memory.model.per_microstep is None and self._values["VI"] < memory.steps_per_count:
                 raise DriveFault(E.VELOCITY_TOO_LOW)
         self._motor.limit_stop.relocate(lambda: self._motor.axis.switch_unit("EE", number, t), t)

@@ -44,7 +44,7 @@ class Bridges:
         return bool(self._values["DE"]) and self.supply and not self.locked
 
     def check(self) -> None:
-        """Check that a motion may be commanded at all. Raises Fault (94, 96)."""
+        """Check that a motion may be commanded at all. Raises DriveFault (94, 96)."""
         if self.locked or not (self.enabled or self.count_when_disabled):
             raise DriveFault(E.DRIVE_DISABLED)
         if not self.supply:
@@ -169,7 +169,10 @@ class Axis:
     # What is commanded.
 
     def go(self, kind: str, value: int, t: float, announce: bool = False, run_on: bool = False) -> None:
-        """Carry out MA or MR. `announce`: send the name when it is over; `run_on`: do not stop there. Raises Fault."""
+        """Carry out MA or MR. Raises DriveFault.
+
+        `announce`: send the name when it is over; `run_on`: do not stop there.
+        """
         counters = self.counters
         if not -0x80000000 <= value <= 0x7FFFFFFF:
             raise DriveFault(E.OUT_OF_RANGE)
@@ -197,7 +200,7 @@ class Axis:
         self.announce = announce
 
     def slew(self, value: int, t: float) -> None:
-        """Carry out SL: turn at a velocity, or slow down and stop. Raises Fault."""
+        """Carry out SL: turn at a velocity, or slow down and stop. Raises DriveFault."""
         counting, fastest = self._memory.counting, self._memory.model.per_microstep
         if abs(value) > (FASTEST_COUNTS if counting else FASTEST_STEPS):
             raise DriveFault(E.OUT_OF_RANGE)
@@ -324,14 +327,14 @@ class Axis:
     # What is checked.
 
     def allow(self, t: float, direction: float) -> None:
-        """Check that the bridges may turn the motor in a direction. Raises Fault (83, 84, 85, 88, 94, 96)."""
+        """Check that the bridges may turn the motor in a direction. Raises DriveFault (83, 84, 85, 88, 94, 96)."""
         self.bridges.check()
         code = self._supervisor.refuse(t, direction)
         if code:
             raise DriveFault(code)
 
     def check_ramps(self) -> None:
-        """Check that a motion may begin with these S-curves. Raises Fault (98, 99) for too steep a middle."""
+        """Check that a motion may begin with these S-curves. Raises DriveFault (98, 99) for too steep a middle."""
         values = self._memory.values
         if values.get("AT", LINEAR) == LINEAR == values.get("DT", LINEAR):
             return
@@ -358,7 +361,7 @@ class Axis:
         return shape if values[rate] * self._memory.scale * shape.peak <= STEEPEST else None
 
     def _ready(self, t: float, direction: float) -> None:
-        """Check that a motion may begin at all. Raises Fault."""
+        """Check that a motion may begin at all. Raises DriveFault."""
         if self._supervisor.homing_active or (self._stopping and self.commanded(t)):
             raise DriveFault(E.HOMING_OR_MOVING)
         self.allow(t, direction)

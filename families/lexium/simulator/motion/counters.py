@@ -209,7 +209,7 @@ class Trips:
         self._arm(self.armed & ~bit)
 
     def arm(self, bits: int, t: float) -> None:
-        """Set TE. Raises Fault (12, 27, 39)."""
+        """Set TE. Raises DriveFault (12, 27, 39)."""
         if any(bits & bit and bit not in self.defined for bit in TRIPS.values()):
             raise DriveFault(E.TRIP_NOT_SET_UP)
         if bits & POSITION and bits & RELATIVE:

@@ -257,7 +257,7 @@ class Hmt:
     # What is commanded.
 
     def set_bounds(self, mode: int) -> None:
-        """Set CB. Raises Fault (21) for another one than there is in torque mode."""
+        """Set CB. Raises DriveFault (21) for another one than there is in torque mode."""
         if self._torque.active:
             if mode:
                 raise DriveFault(E.OUT_OF_RANGE)
@@ -266,7 +266,7 @@ class Hmt:
         self._timeline.replan()
 
     def set_mode(self, mode: int, t: float) -> None:
-        """Set AS. Raises Fault (87, 109): torque mode turns until SL 0 or another stop."""
+        """Set AS. Raises DriveFault (87, 109): torque mode turns until SL 0 or another stop."""
         was = self.mode
         if self._axis.status.moving(t):
             raise DriveFault(E.AS_WHILE_MOVING)
@@ -304,7 +304,7 @@ class Hmt:
         self._timeline.replan()
 
     def make_up(self, mode: int, clearing: int, t: float) -> None:
-        """Set MU. Raises Fault (110) in torque mode."""
+        """Set MU. Raises DriveFault (110) in torque mode."""
         if self._torque.active:
             raise DriveFault(E.MAKE_UP_OFF)
         self._values["MU"] = mode

@@ -45,7 +45,7 @@ class LexiumHoming:
         self._toward = 1
 
     def start(self, word: str, kind: int, t: float) -> None:
-        """Begin HM, HI or HF. Raises Fault (80, 81, 83, 84, 85, 94, 96)."""
+        """Begin HM, HI or HF. Raises DriveFault (80, 81, 83, 84, 85, 94, 96)."""
         if kind not in TYPES:
             raise DriveFault(E.NO_HOMING_TYPE)
         self._axis.bridges.check()
@@ -60,7 +60,10 @@ class LexiumHoming:
             self._approach(t)
 
     def _set_out(self, word: str, directions: tuple[int, int], met: set[int], direction: int, t: float) -> None:
-        """Seek in a direction, 0 where it has found already, or turn round at once. Raises Fault (82 to 85, 94, 96)."""
+        """Seek in a direction, 0 where it has found already, or turn round at once.
+
+        Raises DriveFault (82 to 85, 94, 96).
+        """
         blocked = direction and self._values["LM"] in TURNS_ROUND and self._limits.refuse(t, direction)
         if blocked and met:
             raise DriveFault(E.NO_HOME_SWITCH)

@@ -60,7 +60,7 @@ class Inputs:
         self.types.update(types)
 
     def set_up(self, values: list[int]) -> None:
-        """Carry out IS, or S<n> of an input. Raises Fault (6, 8, 10, 21, 24)."""
+        """Carry out IS, or S<n> of an input. Raises DriveFault (6, 8, 10, 21, 24)."""
         n, *rest = values
         if n not in self.types:
             raise DriveFault(E.NO_SUCH_POINT)

@@ -218,7 +218,7 @@ class LexiumMotor:
         self.end_jog()
 
     def pause_program(self) -> None:
-        """Carry out PS: the program pauses; the motion slows down and stops. Raises Fault (40)."""
+        """Carry out PS: the program pauses; the motion slows down and stops. Raises DriveFault (40)."""
         thread, t = self._core.thread, self._timeline.now
         if not thread.running:
             raise DriveFault(E.NO_PROGRAM_RUNNING)
@@ -233,7 +233,7 @@ class LexiumMotor:
         thread.pause(again)
 
     def resume_program(self) -> None:
-        """Carry out RS. Raises Fault (40, 41, and the motion's own where it may not begin again)."""
+        """Carry out RS. Raises DriveFault (40, 41, and the motion's own where it may not begin again)."""
         thread, t = self._core.thread, self._timeline.now
         if not thread.paused:
             raise DriveFault(E.PROGRAM_RUNNING if thread.running else E.NO_PROGRAM_RUNNING)
@@ -247,7 +247,7 @@ class LexiumMotor:
             self.axis.slew(velocity, t)
 
     def start_test(self, t: float) -> None:
-        """Carry out SC 1. Raises Fault (89, 94, 96, 103)."""
+        """Carry out SC 1. Raises DriveFault (89, 94, 96, 103)."""
         memory, values, axis = self._memory, self._memory.values, self.axis
         if not self.bridges.enabled:
             raise DriveFault(E.NOT_TESTED)

@@ -58,7 +58,7 @@ class Outputs:
         self.driven = driven
 
     def set_up(self, values: list[int]) -> None:
-        """Carry out OS. Raises Fault (6, 8, 10, 21)."""
+        """Carry out OS. Raises DriveFault (6, 8, 10, 21)."""
         n, *rest = values
         if n not in self.types:
             raise DriveFault(E.NO_SUCH_POINT)
@@ -77,13 +77,13 @@ class Outputs:
             self.types[n] = (NOT_ONE, 0)
 
     def write(self, n: int, value: int) -> None:
-        """Carry out O<n>: make a general purpose output active or not. Raises Fault (9)."""
+        """Carry out O<n>: make a general purpose output active or not. Raises DriveFault (9)."""
         if self.types[n][0] != GENERAL:
             raise DriveFault(E.NOT_USER_OUTPUT)
         self.driven[n] = value
 
     def write_all(self, group: Sequence[int], value: int) -> None:
-        """Carry out OT, OL, OH; only points of type 16 change. Raises Fault (9) if a Lexium has none of them."""
+        """Carry out OT, OL, OH; only points of type 16 change. Raises DriveFault (9) if a Lexium has none of them."""
         free = [(place, n) for place, n in enumerate(group) if self.types[n][0] == GENERAL]
         if not (free or self._points.shared):
             raise DriveFault(E.NOT_USER_OUTPUT)

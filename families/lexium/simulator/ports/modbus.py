@@ -76,7 +76,7 @@ class ModbusRefusal(Exception):
 
 
 class DriveRegisters:
-    """One drive's registers. Times are the drive's; raises Refusal."""
+    """One drive's registers. Times are the drive's; raises ModbusRefusal."""
 
     def __init__(self, device: MCodeDevice) -> None:
         self._drive, self._errors, self._program = device, device.errors, device.program
@@ -190,7 +190,7 @@ class DriveRegisters:
         return self.carry_out(f"PR {word}", now).lines[0]
 
     def carry_out(self, line: str, now: float) -> PrintedAnswer:
-        """Carry out one line at once, in program mode too. Raises Refusal (3, 4) if the drive refuses it."""
+        """Carry out one line at once, in program mode too. Raises ModbusRefusal (3, 4) if the drive refuses it."""
         answer = self._drive.execute(line, now, immediate=True)
         if answer.refused:
             code = self._errors.code
@@ -199,7 +199,7 @@ class DriveRegisters:
 
 
 def _rows(start: int, count: int) -> list[ModbusRegister]:
-    """Find the values of registers, one for each. Raises Refusal (2, 3)."""
+    """Find the values of registers, one for each. Raises ModbusRefusal (2, 3)."""
     if not 1 <= count <= MOST_REGISTERS:
         raise ModbusRefusal(ILLEGAL_VALUE)
     try:
@@ -216,7 +216,7 @@ def _check_points(start: int, count: int) -> None:
 
 
 def _values(start: int, rows: Sequence[ModbusRegister], words: Sequence[int]) -> list[tuple[ModbusRegister, int]]:
-    """Combine words to the values of registers. Raises Refusal (3) for a part of a value."""
+    """Combine words to the values of registers. Raises ModbusRefusal (3) for a part of a value."""
     if len(rows) == 2 and rows[0] is rows[1]:
         value = words[0] | words[1] << 16
         if rows[0].width == 4 and value >> 31:
@@ -228,7 +228,7 @@ def _values(start: int, rows: Sequence[ModbusRegister], words: Sequence[int]) ->
 
 
 def _line(row: ModbusRegister, value: int) -> str:
-    """Translate a write to a line of the drive. Raises Refusal (3) for a value that the register refuses."""
+    """Translate a write to a line of the drive. Raises ModbusRefusal (3) for a value that the register refuses."""
     if not row.allows(value):
         raise ModbusRefusal(ILLEGAL_VALUE)
     name = row.name
@@ -325,7 +325,7 @@ class ModbusPort:
             return bytes((pdu[0] | EXCEPTION, refusal.code))
 
     def _carry_out(self, function: int, body: bytes, now: float) -> bytes:
-        """Carry out a function; return what follows its code. Raises Refusal."""
+        """Carry out a function; return what follows its code. Raises ModbusRefusal."""
         registers = self._registers
         match function:
             case 1:
@@ -386,7 +386,7 @@ class ModbusPort:
 
 
 def _pair(body: bytes) -> tuple[int, int]:
-    """Read two words and nothing else. Raises Refusal (3)."""
+    """Read two words and nothing else. Raises ModbusRefusal (3)."""
     if len(body) != 4:
         raise ModbusRefusal(ILLEGAL_VALUE)
     first, second = unpack(">HH", body)

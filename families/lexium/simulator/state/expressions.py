@@ -33,7 +33,7 @@ def wrap(value: int) -> int:
 
 
 def whole(value: Value) -> int:
-    """A value without its fraction. Raises Fault for a value that is not finite."""
+    """A value without its fraction. Raises DriveFault for a value that is not finite."""
     if isinstance(value, int):
         return value
     if not math.isfinite(value):
@@ -99,7 +99,7 @@ def _calls(expression: Expression) -> bool:
 
 @dataclass(frozen=True)
 class Compiler:
-    """Expressions of one drive as closures, or Fault; without `floating_point` it has none, and `F1` is a name.
+    """Expressions of one drive as closures, or DriveFault; without `floating_point` it has none, and `F1` is a name.
 
     Each side of a comparison is carried out by itself, in double precision or not.
     """
@@ -110,7 +110,7 @@ class Compiler:
     def expression(self, expression: Expression, floating: bool = False) -> Read:
         """Return a closure that reads an expression. `floating`: the result goes to an F register.
 
-        Raises Fault (24) where a comparison is in it: only conditions hold one.
+        Raises DriveFault (24) where a comparison is in it: only conditions hold one.
         """
         if compares(expression):
             raise DriveFault(E.ILLEGAL_DATA)

@@ -145,12 +145,12 @@ class ProgramThread:
         self._hold_until = self.next_at = max(self.next_at, self._timeline.now + seconds)
 
     def call(self, entry: int) -> None:
-        """Go on elsewhere until RT. Raises Fault (43)."""
+        """Go on elsewhere until RT. Raises DriveFault (43)."""
         self.push(CallFrame(self.pc))
         self.pc = entry
 
     def give_back(self) -> None:
-        """RT. Raises Fault (43) where nothing was called."""
+        """RT. Raises DriveFault (43) where nothing was called."""
         if not self.stack:
             raise DriveFault(E.STACK_FULL, fatal=True)
         frame = self.stack.pop()
@@ -164,7 +164,7 @@ class ProgramThread:
             self._hold_until = self.next_at = frame.hold_until
 
     def interrupt(self, entry: int, t: float) -> None:
-        """Call a subroutine before the next line, in the middle of a hold too. Raises Fault (43)."""
+        """Call a subroutine before the next line, in the middle of a hold too. Raises DriveFault (43)."""
         holding = self._hold_until > t
         self.push(CallFrame(self.pc, self.waiting, self._hold_until if holding else -inf, self.ending))
         if self.waiting or holding or self.ending:
@@ -191,7 +191,7 @@ class ProgramMode:
         self.address: int | None = None
 
     def store(self, statement: Statement, text: str) -> None:
-        """Store one more line, which compiles. Raises Fault (24, 28, 29, 31, 45)."""
+        """Store one more line, which compiles. Raises DriveFault (24, 28, 29, 31, 45)."""
         address = self.address or 0
         name = self._new_label(statement) if statement.word == "LB" else ""
         self.address = self._program.store(address, text, statement)
@@ -203,7 +203,7 @@ class ProgramMode:
         return frozenset((*self._memory.scopes, *self._program.labels, *self._program.declared))
 
     def check_new(self, word: str) -> None:
-        """Check that a name may be given. Raises Fault (24 bad or reserved, 28 taken, 29 a mnemonic)."""
+        """Check that a name may be given. Raises DriveFault (24 bad or reserved, 28 taken, 29 a mnemonic)."""
         row = lookup(word, self._memory.product)
         if row is not None:
             raise DriveFault(E.ILLEGAL_DATA if row.kind == "reserved" else E.NAME_IS_COMMAND)
@@ -213,12 +213,12 @@ class ProgramMode:
             raise DriveFault(E.NAME_EXISTS)
 
     def check_room(self) -> None:
-        """Check that one more name fits. Raises Fault (31)."""
+        """Check that one more name fits. Raises DriveFault (31)."""
         if len(self._program.labels) + len(self._memory.scopes) >= TABLE_SIZE:
             raise DriveFault(E.NAME_TABLE_FULL)
 
     def _new_label(self, statement: Statement) -> str:
-        """The name that an LB line gives. Raises Fault (24, 28, 29, 31)."""
+        """The name that an LB line gives. Raises DriveFault (24, 28, 29, 31)."""
         name = statement.arguments[0]
         if not isinstance(name, NameTerm):
             raise DriveFault(E.ILLEGAL_DATA)
@@ -255,7 +255,10 @@ class Interpreter:
     # Starting and ending.
 
     def start(self, target: Argument | None, t: float, mode: int = NORMAL) -> None:
-        """EX; a program that runs is left for it, as clients of real units rely on. Raises Fault (24, 30, 34, 42)."""
+        """EX; a program that runs is left for it, as clients of real units rely on.
+
+        Raises DriveFault (24, 30, 34, 42).
+        """
         self._program.resolve(target)
         self._memory.forget_local()
         self._errors.clear()
@@ -290,12 +293,12 @@ class Interpreter:
         thread.refresh()
 
     def break_at(self, target: Argument | None, passes: int) -> None:
-        """BP: step from a place on, when it has been come to so many times; None: nowhere. Raises Fault (30, 42)."""
+        """BP: step from a place on, when it was reached so many times; None: nowhere. Raises DriveFault (30, 42)."""
         self._passes = 0
         self._break = None if target is None else (self._program.resolve(target), passes)
 
     def break_here(self) -> None:
-        """BP alone: step from here on. Raises Fault (40)."""
+        """BP alone: step from here on. Raises DriveFault (40)."""
         if not self._thread.running:
             raise DriveFault(E.NO_PROGRAM_RUNNING)
         self._thread.step_from_here()

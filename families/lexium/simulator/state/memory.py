@@ -67,7 +67,7 @@ def _factory_values(product: str) -> Mapping[str, Value]:
 
 @lru_cache(maxsize=4096)
 def row_of(word: str, product: str) -> Mnemonic | None:
-    """The table's row of a word that a product knows; None where it is a free name. Raises Fault (37)."""
+    """The table's row of a word that a product knows; None where it is a free name. Raises DriveFault (37)."""
     row = lookup(word, product)
     if row is not None and product not in row.products:
         raise DriveFault(E.NOT_AVAILABLE)
@@ -75,7 +75,7 @@ def row_of(word: str, product: str) -> Mnemonic | None:
 
 
 def within(value: Value, low: Value, high: Value) -> Value:
-    """A value in a range. Raises Fault (21)."""
+    """A value in a range. Raises DriveFault (21)."""
     if not low <= value <= high:
         raise DriveFault(E.OUT_OF_RANGE)
     return value
@@ -176,16 +176,16 @@ class Memory:
     # Ranges of words; those of motion depend on EE.
 
     def row(self, word: str) -> Mnemonic | None:
-        """The row of a word, None for a free name. Raises Fault (37)."""
+        """The row of a word, None for a free name. Raises DriveFault (37)."""
         return row_of(word, self.product)
 
     def readable(self, word: str) -> Mnemonic | None:
-        """The row of a word that is only read: one that the product lacks may print 0. Raises Fault (37)."""
+        """The row of a word that is only read: one that the product lacks may print 0. Raises DriveFault (37)."""
         row = lookup(word, self.product)
         return row if row is not None and self.product in row.zero_on else self.row(word)
 
     def checked(self, word: str, value: Value) -> int:
-        """A whole number that a word takes. Raises Fault (21, 37)."""
+        """A whole number that a word takes. Raises DriveFault (21, 37)."""
         number, row = whole(value), self.row(word)
         if row is None or not row.accepts(number, self.counting):
             raise DriveFault(E.OUT_OF_RANGE)
@@ -194,7 +194,7 @@ class Memory:
     def flag(self, word: str, value: Value) -> int:
         """A value for a flag that the drive sets: 0 clears it, another value only where it may be written.
 
-        Raises Fault (21).
+        Raises DriveFault (21).
         """
         row, number = self.row(word), whole(value)
         writable = row is not None and row.access == "RW" and row.accepts(number)

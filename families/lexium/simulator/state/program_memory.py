@@ -53,7 +53,7 @@ class ProgramContents:
         self._declared = None
 
     def store(self, address: int, text: str, statement: Statement) -> int:
-        """Store a line, and delete those that it overlaps. Return the next address. Raises Fault (45)."""
+        """Store a line, and delete those that it overlaps. Return the next address. Raises DriveFault (45)."""
         size = size_of(statement, self.product)
         if address + size > FIRST_ADDRESS + PROGRAM_BYTES:
             raise DriveFault(E.PROGRAM_MEMORY_FULL)
@@ -64,7 +64,7 @@ class ProgramContents:
         return address + size
 
     def resolve(self, target: Argument | None) -> int:
-        """The address that a label or a number means. Raises Fault (30, 34, 42)."""
+        """The address that a label or a number means. Raises DriveFault (30, 34, 42)."""
         if isinstance(target, Number):
             if target.value not in self.lines:
                 raise DriveFault(E.NO_SUCH_ADDRESS, fatal=True)
@@ -79,7 +79,7 @@ class ProgramContents:
         raise DriveFault(E.NOT_EXECUTABLE if row and row.name != "SU" else E.NO_SUCH_NAME, fatal=True)
 
     def check(self, target: Argument | None) -> None:
-        """Check that a place exists, for an instruction that only names it. Raises Fault, which ends no program."""
+        """Check that a place exists, for an instruction that only names it. Raises DriveFault; that ends no program."""
         try:
             self.resolve(target)
         except DriveFault as fault:
@@ -145,14 +145,17 @@ class LinkedProgram:
         self.places = {}
 
     def entry(self, target: Argument | None) -> int:
-        """The line at which a program starts. Raises Fault (24, 30, 34, 42)."""
+        """The line at which a program starts. Raises DriveFault (24, 30, 34, 42)."""
         address = self._program.resolve(target)
         if not self._linked:
             self._link()
         return self.index[address]
 
     def place(self, target: Argument | None) -> int:
-        """Where the program that runs goes on. Raises Fault (30, 34, 42), 42 too for what was stored since it began."""
+        """Where the program that runs goes on.
+
+        Raises DriveFault (30, 34, 42), 42 also for what was stored since it began.
+        """
         place = self.places.get(target)
         if place is None:
             address = self._program.resolve(target)

@@ -305,7 +305,7 @@ def test_the_whole_stop_stops_a_module_that_lost_a_byte_of_the_frame_before(shop
     codec = state.codec
     first = codec.stop(["1"])
     shop.wire.receive(first, shop.now)
-    shop.line.wrote(first, shop.now)
+    shop.line.note_written(first, shop.now)
     shop.line.stop(shop.now, *codec.stop_again(["1"]))
     shop.wait(3.0)
     assert shop.type(state, "GAP 3, 0") == ("0",)

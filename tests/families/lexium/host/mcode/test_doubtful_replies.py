@@ -7,7 +7,7 @@ import pytest
 from multidrop.base.errors import NoAnswer
 from multidrop.dialects import End, Kind, Priority, Reply
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.exchange import fresh
+from multidrop.families.lexium.host.mcode.exchange import fresh_mark
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.framing import sealed
 from multidrop.families.lexium.host.mcode.state import MCodeState
@@ -253,7 +253,7 @@ def test_after_l_an_address_alone_may_be_that_of_the_first_line(text):
 @pytest.mark.parametrize("em", [1, 2, 3])
 def test_lines_that_come_after_the_mark_was_sent_belong_to_the_list(em):
     state = MCodeState(MCode(em))
-    own = fresh(state, "", party=False)
+    own = fresh_mark(state, "", party=False)
     request = state.codec.request("", f"PR {own.item}")
     request = replace(request, expect=own.shown, gather=True, signed=True)
     head = {1: "\r\n", 2: "", 3: f"PR {own.item}\r\n"}[em]

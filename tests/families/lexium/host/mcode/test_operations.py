@@ -7,7 +7,7 @@ import pytest
 from multidrop.base.errors import NoAnswer, Refused, Stopped
 from multidrop.dialects import DriveState, End, Kind, Owed, Priority, Reply
 from multidrop.families.lexium.host.mcode.codec import MCode
-from multidrop.families.lexium.host.mcode.exchange import answered, take_out
+from multidrop.families.lexium.host.mcode.exchange import send_until_answered, take_out
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.families.lexium.host.mcode.settings import listed
 from multidrop.families.lexium.host.mcode.state import MCodeState
@@ -132,12 +132,12 @@ def test_a_damaged_frame_is_repeated_and_a_refused_one_never():
 @pytest.mark.parametrize(
     ("before", "code", "runs"),
     [(True, "21", "0"), (False, "86", "0"), (False, "21", "1")],
-    ids=["the flag stood", "a stall comes by itself", "a program runs"],
+    ids=["the flag was set", "a stall comes by itself", "a program runs"],
 )
 def test_a_nak_while_an_error_may_have_stood_does_not_tell_and_is_never_repeated(before, code, runs):
     state = checked()
     state.error = before
-    talk = answered(state, state.codec.request("", "MR 1"))
+    talk = send_until_answered(state, state.codec.request("", "MR 1"))
     assert next(talk).text == "MR 1"
     assert talk.send(NAKED).text == 'PR ER,"~"'
     with pytest.raises(NoAnswer, match="not known whether 'MR 1' was executed; it was sent once"):

@@ -7,7 +7,7 @@ from multidrop.dialects.program_files import Held
 from multidrop.families.lexium.host.mcode import codec as codecs
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
-from multidrop.families.lexium.host.mcode.quiet import BETWEEN, EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
+from multidrop.families.lexium.host.mcode.quiet import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, WITHIN_REPLY
 from multidrop.families.lexium.manual import program_file
 from tests.support.mcode_drives import one_drive
 
@@ -91,7 +91,7 @@ def test_the_quiet_time_by_what_has_come(em, check, text, buffer, seconds):
 
 @pytest.mark.parametrize(
     ("buffer", "seconds"),
-    [(b"\x06", BETWEEN), (b"\x0642", BETWEEN), (b"\x0642\r", BETWEEN), (b"\x0642\r\n", SHORT)],
+    [(b"\x06", WITHIN_REPLY), (b"\x0642", WITHIN_REPLY), (b"\x0642\r", WITHIN_REPLY), (b"\x0642\r\n", SHORT)],
 )
 def test_a_print_of_unknown_modes_waits_for_its_line_end_as_long_as_a_slow_gateway_takes(buffer, seconds):
     request = Request("", "PR Q1", Kind.QUIET, MCode(), expect="42")
