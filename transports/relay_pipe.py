@@ -30,7 +30,7 @@ from multidrop.transports.relay import (
 
 _READ_BYTES = 4096
 _WAITED = 64 * 1024
-_PATIENCE = 5.0
+SETTING_TIMEOUT = 5.0
 """Seconds to wait for the outcome of a change of a setting."""
 
 
@@ -210,7 +210,7 @@ class RelayEndpoint:
     def outcome(self, number: int) -> str:
         """Wait for the outcome of a change. Raises OSError where none comes."""
         with self.news:
-            self.news.wait_for(lambda: self._ended or number in self.outcomes, _PATIENCE)
+            self.news.wait_for(lambda: self._ended or number in self.outcomes, SETTING_TIMEOUT)
             if number not in self.outcomes:
                 raise OSError("the far side does not reply" if not self._ended else "the connection has ended")
             return self.outcomes.pop(number)

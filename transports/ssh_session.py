@@ -140,7 +140,7 @@ _PREAMBLE = 65536
 """The largest number of bytes that a far shell may print before the greeting."""
 _SETTLE = 0.3
 """Seconds in which socat ends if it cannot open the port."""
-_ENDING = 2.5
+ENDING_TIMEOUT = 2.5
 """Seconds that ssh gets for its end once its input has ended."""
 _READ_BYTES = 4096
 _PREFIX = re.compile(r"multidrop: |\S+ \S+ socat\[\d+\] [A-Z] ")
@@ -208,7 +208,7 @@ class SshSession(SocketStream):
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
         # Read until the end, so that ssh never waits for a reader.
-        deadline = time.monotonic() + (0.0 if lost else _ENDING)
+        deadline = time.monotonic() + (0.0 if lost else ENDING_TIMEOUT)
         with contextlib.suppress(OSError):
             while (left := deadline - time.monotonic()) > 0:
                 self._socket.settimeout(left)
@@ -296,7 +296,7 @@ async def _greeting(session: SshSession, far: FarPort, way: str) -> tuple[str, b
             if wrong := unknown_greeting(text):
                 raise Unreachable(f"{far.name}: {wrong}")
             said = text or said
-    status = await asyncio.to_thread(session.status, _ENDING)
+    status = await asyncio.to_thread(session.status, ENDING_TIMEOUT)
     raise _failure(far, status, session.last_words() or said, way)
 
 

@@ -12,7 +12,7 @@ from multidrop.dialects.codec import End
 from multidrop.drives.events import ConversationOutcome, Sample, Silent, Transaction, Valued
 from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
 from multidrop.drives.readings import MotionReading
-from multidrop.drives.telemetry import DriveValue, _MotionPoller, _ValuePoller
+from multidrop.drives.telemetry import DriveValue, Telemetry
 from multidrop.families.lexium.host.mcode.codec import MCode
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
@@ -297,14 +297,14 @@ async def test_a_subscription_ends_once():
 # Motion and values
 
 
-def motions(*names: str) -> tuple[_MotionPoller, ToldLink, Any]:
+def motions(*names: str) -> tuple[Telemetry, ToldLink, Any]:
     link = ToldLink()
     roster: Any = SimpleNamespace(link=link, drives={name: Drive(name) for name in names})
     roster.at = roster.drives.__getitem__
     for drive in roster.drives.values():
         drive.asked = []
         drive.start_motion = lambda priority, over, drive=drive: drive.asked.append((priority, over))
-    return _MotionPoller(roster), link, roster
+    return Telemetry(roster), link, roster
 
 
 def reply(roster: Any, at: float, *axes: Motion) -> None:
@@ -373,7 +373,7 @@ async def test_a_drive_that_does_not_reply_to_a_poll_is_silent():
     assert link.events == [Silent(now, "a")]
 
 
-def values(*names: str) -> tuple[_ValuePoller, ToldLink, Any]:
+def values(*names: str) -> tuple[Telemetry, ToldLink, Any]:
     link = ToldLink()
     roster: Any = SimpleNamespace(link=link, drives={name: Drive(name) for name in names})
     roster.at = roster.drives.__getitem__
@@ -381,12 +381,12 @@ def values(*names: str) -> tuple[_ValuePoller, ToldLink, Any]:
         drive.asked = []
         drive.family = SimpleNamespace(values=SimpleNamespace(again=lambda *asked: asked))
         drive.start = lambda procedure, over, typed, drive=drive: drive.asked.append((procedure, over, typed))
-    return _ValuePoller(roster), link, roster
+    return Telemetry(roster), link, roster
 
 
 async def test_a_value_is_read_by_its_word_again_and_again():
     poller, link, roster = values("a")
-    poller.subscribe([DriveValue("a", "I4")], 0.5)
+    poller.read([DriveValue("a", "I4")], 0.5)
     await asyncio.sleep(0.01)
     [(procedure, over, typed)] = roster.at("a").asked
     assert (procedure, typed) == (("I4", Priority.POLL), True)
@@ -398,30 +398,30 @@ async def test_a_value_is_read_by_its_word_again_and_again():
 
 async def test_a_value_that_is_refused_is_said_once_and_not_read_again():
     poller, link, roster = values("a")
-    poller.subscribe([DriveValue("a", "I4")], 0.1)
+    poller.read([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(0.01)
     roster.at("a").asked[0][1](ConversationOutcome((), Refused("a: error 21")))
     await asyncio.sleep(60)
     assert link.told == [("a: error 21; it is not read again", "a", True)] and len(roster.at("a").asked) == 1
-    poller.subscribe([DriveValue("a", "I4")], 0.1)
+    poller.read([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(1)
     assert len(roster.at("a").asked) == 1
 
 
 async def test_a_subscription_that_begins_again_reads_a_refused_value_again():
     poller, link, roster = values("a")
-    subscription = poller.subscribe([DriveValue("a", "I4")], 0.1)
+    subscription = poller.read([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(0.01)
     roster.at("a").asked[0][1](ConversationOutcome((), Refused("a: error 21")))
     subscription.close()
-    poller.subscribe([DriveValue("a", "I4")], 0.1)
+    poller.read([DriveValue("a", "I4")], 0.1)
     await asyncio.sleep(0.01)
     assert len(roster.at("a").asked) == 2
 
 
 async def test_a_value_that_gets_three_naks_in_a_row_counts_as_refused():
     poller, link, roster = values("a")
-    poller.subscribe([DriveValue("a", "I4")], 0.1)
+    poller.read([DriveValue("a", "I4")], 0.1)
     for number in range(3):
         await asyncio.sleep(4)
         assert len(roster.at("a").asked) == number + 1 and link.told == []

@@ -10,7 +10,7 @@ import pytest
 
 from multidrop import AsyncDrive, AsyncSession, Diagnostic, Inexpressible, Refused, connect_async
 from multidrop.drives.events import Traffic
-from tests.support.behind_api import drive_of, floor_of, moving, shell_of
+from tests.support.behind_api import floor_of, moving, shell_of
 from tests.support.cases import for_each
 from tests.support.cell_session import bus, drive, party, pmx
 
@@ -57,13 +57,13 @@ async def test_a_session_that_is_closed_lets_its_drives_go_on(session: AsyncSess
 
 
 async def test_a_position_that_does_not_count_is_that_of_its_axis_and_of_the_drive(session: AsyncSession) -> None:
-    state = drive_of(session.drive("pmx:00")).state
+    state = shell_of(session).buses["pmx"].drives["00"].state
     assert all(axes(session).values()) and session.drive("press:a").referenced
     state.reference_lost(["x"])
     assert axes(session) == {"": False, "x": False, "y": True, "X": False, "Y": True}
     state.reference_lost(["x", "y"])
     assert not any(axes(session).values())
-    drive_of(session.drive("press:a")).state.reference_lost([""])
+    shell_of(session).buses["press"].drives["a"].state.reference_lost([""])
     assert not session.drive("press:a").referenced and session.drive("press:b").referenced
     await session.drive("press:a").accept()
     assert session.drive("press:a").referenced

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -40,7 +40,8 @@ def test_a_version_that_differs_is_named_with_its_place(
 
 
 def test_a_tree_with_changes_is_no_release(release: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(release, "_run", lambda *command: "?? new.py")
+    done = SimpleNamespace(returncode=0, stdout="?? new.py\n", stderr="")
+    monkeypatch.setattr(release.subprocess, "run", lambda *command, **named: done)
     with pytest.raises(release.Wrong, match="commit them first"):
         release.checked_version()
 

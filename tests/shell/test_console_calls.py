@@ -40,7 +40,7 @@ class Call:
 
 def behind(pointer: Any) -> Any:
     """What a pointer of ctypes points to."""
-    return pointer._obj
+    return ctypes.cast(pointer, ctypes.POINTER(wintypes.DWORD)).contents
 
 
 def number(handle: Any) -> int:

@@ -11,6 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from multidrop.base.errors import Diagnostic, NoAnswer, Stopped, TransportLost
+from multidrop.drives.conversations import Conversations
 from multidrop.macros import Macro, MacroStep
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Bytes
@@ -186,8 +187,7 @@ async def test_raw_waits_for_the_conversation_under_way_and_a_stop_ends_that(tmp
         assert shop.printed()[-1] == "0" and "line" in shop.session.raw
         await shop.session.run("/raw off")
         never = asyncio.get_running_loop().create_future()
-        line = shop.session.buses["line"]
-        with mock.patch.object(type(line._conversations), "under_way", [SimpleNamespace(over=never)]):
+        with mock.patch.object(Conversations, "under_way", [SimpleNamespace(over=never)]):
             reserving = asyncio.create_task(shop.session.run("/raw"))
             await asyncio.sleep(1.0)
         shop.session.stop()

@@ -18,11 +18,6 @@ def shell_of(session: Any) -> Any:
     return session._shell
 
 
-def drive_of(drive: Any) -> Any:
-    """The host's drive that an awaited drive of the API calls."""
-    return drive._drive
-
-
 def thread_of(session: Any) -> Any:
     """The thread in which a blocking session works."""
     return session._thread

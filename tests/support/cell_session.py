@@ -14,6 +14,7 @@ import pytest
 from multidrop.dialects.units import scale
 from multidrop.drives.events import Traffic
 from multidrop.shell.configuration import Guarding, SavedConnection, Settings
+from multidrop.shell.connect.opening import Opener
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import load
@@ -101,6 +102,7 @@ class CellSession:
         own: tuple[str, ...] = (),
         guards: Sequence[str] = (),
         usb: bool = False,
+        opener: Opener | None = None,
     ) -> None:
         if usb:
             pytest.importorskip("multidrop.features.usb")
@@ -113,7 +115,7 @@ class CellSession:
             saved, self.url = {"saved": SavedConnection("saved", self.url, {}, scales)}, "saved"
         off = Guarding(off=frozenset(guards))
         settings = Settings(saved, folder / "config", folder / "state", off, own_units=own, data=folder / "data")
-        self.session = Session(settings, reconnect=reconnect)
+        self.session = Session(settings, reconnect=reconnect, opener=opener)
         self.session.questions.agreed = True
         self._open = ExitStack()
         self.events: list[Any] = []

@@ -510,7 +510,7 @@ async def test_what_waits_for_its_credit_as_it_is_closed_leaves_with_the_report(
 
 @pytest.mark.virtual
 async def test_no_setting_is_changed_while_it_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(relay_pipe, "_PATIENCE", 0.0)
+    monkeypatch.setattr(relay_pipe, "SETTING_TIMEOUT", 0.0)
     each = Open()
     each.start()
     each.pipe.write(ESC)

@@ -452,7 +452,7 @@ def test_closing_lets_ssh_end_by_itself_and_ends_one_that_does_not_in_time(
 def test_an_ssh_that_says_nothing_and_stays_is_ended_after_its_time(
     here: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ssh_session, "_ENDING", 0.01)
+    monkeypatch.setattr(ssh_session, "ENDING_TIMEOUT", 0.01)
     gate = threading.Event()
     closing = session(here, Play(reply=lambda data: b"" if gate.wait() else b""))
     closing.write(b"PR P\r")

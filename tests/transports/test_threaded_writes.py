@@ -174,7 +174,7 @@ async def test_what_follows_a_stop_leaves_though_the_writer_waits_for_nothing_el
         assert pipe.preempt(False, lambda dropped: b"!1")
         device.begun()
         device.may.release()
-        await until(lambda: device.written == [b"!1"] and pipe._idle(), 5.0)
+        await until(lambda: device.written == [b"!1"] and not pipe.pending, 5.0)
         assert pipe.follow(lambda waiting: b"!2")
         assert device.taking.acquire(timeout=5.0)
         device.may.release()

@@ -96,7 +96,7 @@ class Bench:
         return {
             "sent": list(self.session.sent),
             "line": (before.text, before.selection),
-            "other lines": {bus: (draft.text, draft.selection) for bus, draft in main._drafts.items() if draft.text},
+            "all lines": main.take_lines(),
             "selected": (self.session.selected_bus, self.session.addresses[self.session.selected_bus]),
             "screens": [type(screen).__name__ for screen in self.screen.app.screen_stack],
             "exits": list(self.screen.exits),

@@ -2,7 +2,6 @@
 
 import asyncio
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -10,7 +9,7 @@ from multidrop.base.errors import Diagnostic, NoAnswer
 from multidrop.dialects import Hints
 from multidrop.shell import stop_report
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.opening import OpenedBus
+from multidrop.shell.connect.opening import OpenedBus, open_buses
 from multidrop.shell.openings import label
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
@@ -134,18 +133,14 @@ async def test_a_stop_while_others_are_being_opened_reaches_the_open_ones(tmp_pa
 
 
 async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_first_to_be_sent_there(tmp_path):
-    cell = CellSession(tmp_path, bus("press", party("a", ES=1), party("b", ES=3)))
-    openings: Any = cell.session.openings
-    real = openings._opener
-
     async def slow(connection, naming):
         await asyncio.sleep(5.0)
-        opened = await real(connection, naming)
+        opened = await open_buses(connection, naming)
         for placed in opened[0].floor.floor.drives:
             placed.device.execute("SL 5000", opened[0].floor.now())
         return opened
 
-    openings._opener = slow
+    cell = CellSession(tmp_path, bus("press", party("a", ES=1), party("b", ES=3)), opener=slow)
     opening = asyncio.create_task(cell.session.open(cell.url))
     await asyncio.sleep(1.0)
     cell.session.stop("Ctrl+X")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import struct
-from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from multidrop.families.lexium.manual.modbus.registers import AT, REGISTERS, ROWS, ModbusRegister
+from multidrop.families.lexium.simulator.ports.modbus import DriveRegisters
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from tests.support.cases import for_each
@@ -275,7 +275,7 @@ def test_user_variables_are_there_while_a_program_declares_them():
 # Values whose form differs.
 
 
-def test_values_wider_than_their_registers():
+def test_values_wider_than_their_registers(monkeypatch):
     drive = Drive()
     drive.floor.command("/sim analog ! 4095", 0.0)
     assert drive.get("I5") == 1023
@@ -283,12 +283,11 @@ def test_values_wider_than_their_registers():
     assert drive.get("D5") == 255
     drive.mcode("CE=2")
     assert drive.get("CE") == 2 and drive.put("CE", 2) == ILLEGAL_VALUE
-    registers: Any = drive.port._registers
     for status, low in ((256, 0), (257, 1), (511, 255)):
-        registers.number = lambda word, now, status=status: status
+        monkeypatch.setattr(DriveRegisters, "number", lambda registers, word, now, status=status: status)
         assert drive.get("AF") == low
     for faults, any_of_them in ((0, 0), (1, 1), (2, 1), (3, 1)):
-        registers.number = lambda word, now, faults=faults: faults
+        monkeypatch.setattr(DriveRegisters, "number", lambda registers, word, now, faults=faults: faults)
         assert drive.get("OF") == any_of_them
 
 
