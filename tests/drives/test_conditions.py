@@ -11,7 +11,7 @@ from multidrop.dialects.values import Part
 from multidrop.drives.events import Conditioned
 from multidrop.drives.readings import ProgramReading
 from multidrop.drives.telemetry import AGED, LEAST_AGE, Telemetry
-from tests.support.told_link import ToldLink
+from tests.drives.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
 

@@ -9,7 +9,7 @@ from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import RECOVERY_QUIET, Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.framing import sealed
-from tests.support.line_run import LineRun
+from tests.drives.line_run import LineRun
 
 ECHO = MCode(em=0)
 QUIETLY = MCode(em=1)

@@ -13,8 +13,8 @@ from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import LATE_WITHIN
 from multidrop.drives.line import LONGEST_LIST, LONGEST_WAIT_FOR_QUIET, Finished, Line, Write
 from multidrop.families.lexium.host.mcode.codec import MCode
+from tests.drives.line_run import LineRun
 from tests.support.examples import examples
-from tests.support.line_run import LineRun
 
 QUIETLY = MCode(em=1)
 PARTY = MCode(em=1, party=True)

@@ -23,7 +23,7 @@ from multidrop.drives.line import (
     merged,
 )
 from multidrop.families.lexium.host.mcode.codec import MCode
-from tests.support.line_run import LineRun
+from tests.drives.line_run import LineRun
 
 
 @dataclass(frozen=True)

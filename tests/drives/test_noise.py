@@ -1,6 +1,6 @@
 """People at the drives of a noisy party line, and a NAK that noise makes: what is told is true.
 
-A sample of what was run at length (`tests/support/noisy_wire.py`): no value is told as another drive's, as an older one
+A sample of what was run at length (`tests/drives/noisy_wire.py`): no value is told as another drive's, as an older one
 or as a program's, and nothing is executed twice. Without a checksum a digit may be damaged, which nothing can tell.
 """
 
@@ -9,9 +9,9 @@ import pytest
 from multidrop.base.errors import DriveError, NoAnswer
 from multidrop.families.lexium.host.mcode.family import MCodeFamily
 from multidrop.simulator.cell.spec import Faults
+from tests.drives.noisy_wire import Crowd
 from tests.support.faults import disturb
 from tests.support.mcode_drives import Desk
-from tests.support.noisy_wire import Crowd
 from tests.support.procedure import ProcedureRunner
 
 NOISE = {

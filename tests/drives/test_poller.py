@@ -14,9 +14,9 @@ from multidrop.drives.poller import AFTER_DEFECT, Due, Poller, Subscription
 from multidrop.drives.readings import MotionReading
 from multidrop.drives.telemetry import DriveValue, Telemetry
 from multidrop.families.lexium.host.mcode.codec import MCode
+from tests.drives.told_link import ToldLink
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
-from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
 

@@ -19,9 +19,9 @@ from multidrop.drives.roster import RETRY_PAUSE, Restarts, Roster, _compare, _sh
 from multidrop.drives.roster import _ran_on as ran_on
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.families.lexium.host.mcode.state import MCodeState
+from tests.drives.told_link import ToldLink
 from tests.support.cell_session import party
 from tests.support.simulated_bus import SimulatedBus
-from tests.support.told_link import ToldLink
 
 pytestmark = pytest.mark.virtual
 

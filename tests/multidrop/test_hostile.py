@@ -9,8 +9,8 @@ import time
 import pyte
 import pytest
 
+from tests.multidrop.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
 from tests.support.front_door import read_to_end
-from tests.support.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
 from tests.support.posix import pexpect
 from tests.support.processes import environment
 from tests.support.until import PATIENCE

@@ -20,8 +20,8 @@ from multidrop.transports.relay_pipe import SocketStream
 from multidrop.transports.ssh import FarPort, NotInstalled
 from multidrop.transports.ssh_session import SshSession, greeted, open_ssh
 from tests.support.cases import for_each
-from tests.support.ssh_in_memory import RELAY, SOCAT, FarRelay, Machine, Play, installed
 from tests.support.until import until
+from tests.transports.ssh_in_memory import RELAY, SOCAT, FarRelay, Machine, Play, installed
 
 pytestmark = pytest.mark.fork
 

@@ -13,8 +13,8 @@ from multidrop.shell.connect.opening import OpenedBus, open_buses
 from multidrop.shell.openings import label
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
+from tests.shell.connect.fake_bus import FakeBus
 from tests.support.cell_session import CellSession, bus, party
-from tests.support.fake_bus import FakeBus
 
 pytestmark = pytest.mark.virtual
 

@@ -16,7 +16,7 @@ from multidrop.shell.prompt import prompt
 from multidrop.shell.prompt.terminal_input import TYPING_PAUSE, at_terminal
 from multidrop.shell.prompt.view import PlainOutput
 from multidrop.shell.verbs.explaining import overview
-from tests.support.typist import typist as typist_in
+from tests.shell.prompt.typist import typist as typist_in
 from tests.support.until import until
 
 pytestmark = pytest.mark.virtual

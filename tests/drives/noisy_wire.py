@@ -1,4 +1,4 @@
-"""Shared by the tests: several hosts' conversations at once on one noisy party line in memory, and a judge of them.
+"""Several hosts' conversations at once on one noisy party line in memory, and a judge of them.
 
 The judge knows what each simulated drive holds and has carried out. Every drive's R1 is another number each time that
 it is asked for, so that a value that is told as a drive's can be traced to where it comes from.
