@@ -5,7 +5,6 @@ A block that begins with a remark of just a file's name (`# line.toml`, `' turn.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import doctest
 import io
@@ -21,11 +20,11 @@ from unittest import mock
 import pytest
 
 from multidrop.__main__ import main
+from tests.support.front_door import virtual_runner
 from tests.support.pages import EXAMPLES, PAGES, blocks
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
-from tests.support.virtual import VirtualLoop
 
 pytestmark = pytest.mark.process
 
@@ -41,11 +40,10 @@ def everything(folder: Path, env: dict[str, str], command: str) -> str:
     printed = io.StringIO()
     echo = PLAIN.match(command)["code"]
     words = shlex.split(command.removesuffix(echo or "").removesuffix(" 2>&1"))
-    runner = asyncio.Runner
     with (
         contextlib.chdir(folder),
         mock.patch.dict(os.environ, env),
-        mock.patch("asyncio.Runner", lambda **more: runner(**more | {"loop_factory": VirtualLoop})),
+        virtual_runner(),
         contextlib.redirect_stdout(printed),
         contextlib.redirect_stderr(printed),
     ):

@@ -16,7 +16,7 @@ from multidrop.shell.prompt.terminal_input import TYPING_PAUSE
 from tests.support.front_door import read_to_end
 
 CELL = '[[bus]]\nname = "press"\n[[bus.drive]]\npersonality = "LMDCM"\n'
-MODULES = {"1": "TMCM-1140", "30": "TMCM-6110", "40": "TMCM-1241", "200": "TMCM-1276"}
+MODULES = {"1": "TMCM-1140", "3": "TMCM-6110", "4": "TMCM-1241", "200": "TMCM-1276"}
 CONTRACT = {"port", "baud", "address", "product", "version", "serial", "party", "checksum", "em"}
 
 
@@ -101,7 +101,7 @@ def test_what_cannot_be_searched_is_one_line(multidrop, command, arguments, code
 
 TMCL = "".join(
     [
-        '[[bus]]\nname = "slide"\nserve = ["pty:slide.tty", "tcp://127.0.0.1:0"]\nbaud = 115200\n',
+        '[[bus]]\nname = "slide"\nserve = ["tcp://127.0.0.1:0"]\nbaud = 115200\n',
         *(f'[[bus.drive]]\npersonality = "{product}"\nname = "{name}"\n' for name, product in MODULES.items()),
     ]
 )
@@ -119,15 +119,13 @@ def test_tmcl_is_searched_only_by_name_and_agreement(multidrop, tmp_path):
     assert done.returncode == 2 and "'tmcl'" in done.stderr
 
 
-@pytest.mark.process
-@pytest.mark.slow
-def test_modules_of_a_served_line_are_found_at_their_addresses_and_opened_by_the_url(home):
-    home.serve(TMCL)
-    done = home.run("scan", str(home.folder / "slide.tty"), "--baud", "115200", "--dialect", "tmcl", "--all", "--yes")
+def test_modules_are_found_at_their_addresses_and_opened_by_the_url(multidrop, tmp_path):
+    (tmp_path / "cell.toml").write_text(TMCL)
+    done = multidrop("scan", "sim:cell.toml", "--dialect", "tmcl", "--all", "--yes")
     assert done.returncode == 0
-    assert re.findall(r"115200 baud  (\d+)  (TMCM-\d+)", done.stdout) == [*MODULES.items()]
+    assert re.findall(r"(\d+)  (TMCM-\d+)", done.stdout) == [*MODULES.items()]
     [*_, url] = shlex.split(done.stderr.partition("open with: ")[2])
-    asked = home.run("send", url, *(f"@{name} SAP 193, 0, 4" for name in MODULES), "@30 GAP 193, 0")
+    asked = multidrop("send", url, *(f"@{name} SAP 193, 0, 4" for name in MODULES), "@3 GAP 193, 0")
     assert (asked.returncode, asked.stdout) == (0, "4\n")
 
 
@@ -136,14 +134,14 @@ def test_modules_of_a_served_line_are_found_at_their_addresses_and_opened_by_the
 def test_the_stop_key_in_a_search_stops_the_modules_that_were_asked(home):
     home.serve(TMCL)
     url = f"{home.endpoints['slide']['tcp']}?dialect=tmcl&drives={','.join(MODULES)}"
-    assert home.run("send", url, "@1 ROR 0, 500", "@30 ROR 2, 500", "@40 ROR 0, 500", "@200 ROR 0, 500").returncode == 0
+    assert home.run("send", url, "@1 ROR 0, 500", "@3 ROR 2, 500", "@4 ROR 0, 500", "@200 ROR 0, 500").returncode == 0
     child = home.terminal("scan", home.endpoints["slide"]["tcp"], "--dialect", "tmcl", "--all", columns=200)
     child.expect(r"LF, CR and ESC to them. Go on\? \[y/N\]")
     time.sleep(2 * TYPING_PAUSE)  # the pause itself: from here on a key counts
     child.send("y")
-    child.expect("40  TMCM-1241")
+    child.expect("4  TMCM-1241")
     child.send("\x18")
     child.expect("the stop was sent with TMCL")
     assert read_to_end(child) == 4
-    motors = ("1", "GAP 3, 0"), ("30", "GAP 3, 2"), ("40", "GAP 3, 0"), ("200", "GAP 3, 0")
+    motors = ("1", "GAP 3, 0"), ("3", "GAP 3, 2"), ("4", "GAP 3, 0"), ("200", "GAP 3, 0")
     assert home.run("send", url, *(f"@{name} {text}" for name, text in motors)).stdout.split() == ["0", "0", "0", "500"]

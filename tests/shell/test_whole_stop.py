@@ -5,6 +5,7 @@ The gaps between the stops of a line are exact in virtual time (tests/drives/tes
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 import threading
@@ -64,10 +65,11 @@ class Plant:
     async def begin(self, stack: AsyncExitStack) -> None:
         self.floor = RunningFloor(Floor(load(str(self.cell))))
         stack.callback(self.floor.close)
-        for each in self.floor.floor.cell.buses:
-            [served] = await serve_bus(self.floor, each, stack)
-            await self.session.open(f"{served.endpoint}?{LINES[each.name][0]}", each.name)
         stack.push_async_callback(self.session.close)
+        served = {each.name: (await serve_bus(self.floor, each, stack))[0] for each in self.floor.floor.cell.buses}
+        await asyncio.gather(
+            *(self.session.open(f"{at.endpoint}?{LINES[name][0]}", name) for name, at in served.items())
+        )
         for name, line in self.session.buses.items():
             for known in line.all_drives:
                 await self.session.run(f"@{name}:{known.address} {LINES[name][1]}")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import functools
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +20,7 @@ import pytest
 
 from multidrop.__main__ import main
 from multidrop.shell.batch import runner
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from tests.support.processes import Running, environment
 from tests.support.until import PATIENCE
 
@@ -37,14 +40,30 @@ def command(folder: Path, *arguments: str, stdin: str = "") -> Done:
     """Run a command of the front door in a folder that has a configuration and a state of its own."""
     out, err = io.StringIO(), io.StringIO()
     with (
+        contextlib.ExitStack() as around,
         contextlib.chdir(folder),
         mock.patch.dict(os.environ, environment(folder)),
         mock.patch("sys.stdin", io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
     ):
+        if on_cells(arguments):
+            around.enter_context(virtual_runner())
         code = main(arguments)
     return Done(code, out.getvalue(), err.getvalue())
+
+
+def on_cells(arguments: Sequence[str]) -> bool:
+    """Whether a command has to do with embedded cells alone, so that nothing outside keeps the real time."""
+    return any(each.startswith("sim:") for each in arguments) and not any(
+        re.search("://|/dev/|tty|COM", each) for each in arguments
+    )
+
+
+def virtual_runner() -> contextlib.AbstractContextManager[Any]:
+    """Let what asks asyncio for a runner run on a clock that does not wait."""
+    runner = asyncio.Runner
+    return mock.patch("asyncio.Runner", lambda **more: runner(**more | {"loop_factory": VirtualLoop}))
 
 
 @pytest.fixture

@@ -1,7 +1,8 @@
 """Plugin of the test run: which tests run, and that the markers are true.
 
 `process` marks a test that starts a process, `tui` one that runs the app: a test that does so without its marker fails.
-`virtual` marks a test, or a file of tests, that runs on a loop whose clock does not wait.
+`virtual` marks a test, or a file of tests, that runs on a loop whose clock does not wait. `tui` does so as well, unless
+there is a process or a pseudo-terminal, or the marker `real`: a thread or a socket keeps the real time.
 `needs` names programs of others, such as `mbpoll`: without them a test is skipped, or fails (`tests.support.tools`).
 `wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
 the tests with the marker `nightly`, and those that `nightly.txt` lists.
@@ -13,11 +14,13 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import importlib
 import os
 import re
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -37,6 +40,9 @@ NIGHTLY = frozenset(Path(__file__).with_name("nightly.txt").read_text(encoding="
 
 SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text(encoding="utf-8").splitlines())
 """Test functions that were measured to take long, and are marked slow without a word in their file."""
+
+MOMENT = 0.02
+"""How long a test of the screen waits behind a key for timers that are due, s: longer than a frame of Textual's."""
 
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
@@ -107,7 +113,13 @@ def _demand(marker: str, act: str) -> None:
 
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
     """Choose the clock of an async test, and of its async fixtures."""
-    return {"virtual": VirtualLoop} if item.get_closest_marker("virtual") else {"real": asyncio.new_event_loop}
+    return {"virtual": VirtualLoop} if is_virtual(item) else {"real": asyncio.new_event_loop}
+
+
+def is_virtual(item: pytest.Item) -> bool:
+    """Whether a test runs in virtual time: one of the app does, unless something outside keeps the real time."""
+    names = {mark.name for mark in item.iter_markers()}
+    return "virtual" in names or ("tui" in names and not names & {"real", "pty", "process"})
 
 
 def left_out_whole(file: Path) -> str | None:
@@ -174,6 +186,9 @@ def pytest_collection_finish() -> None:
     if "textual.app" in sys.modules:
         _watch_apps(sys.modules["textual.app"].App)
         _keep_parsed(sys.modules["textual.css.stylesheet"].Stylesheet)
+        for name in ("textual.app", "textual.pilot"):
+            vars(importlib.import_module(name))["wait_for_idle"] = until_idle
+        vars(importlib.import_module("textual._time"))["get_time"] = clock
 
 
 def _watch_apps(app: Any) -> None:
@@ -201,6 +216,26 @@ def _keep_parsed(sheet: Any) -> None:
         return kept[key]
 
     sheet._parse_rules = parsed
+
+
+async def until_idle(min_sleep: float = 0.0, max_sleep: float = 1.0) -> None:
+    """Wait until the loop has nothing to do but wait, before and after a moment for its timers.
+
+    Textual's own asks for the processor time, and waits for a second where a screen that polls is never idle.
+    """
+    loop: Any = asyncio.get_running_loop()
+    for moment in (0.0, MOMENT):
+        await asyncio.sleep(moment)
+        while loop._ready:
+            await asyncio.sleep(0)
+
+
+def clock() -> float:
+    """Return the time of the running loop, so that Textual's timers go by a virtual clock, too."""
+    try:
+        return asyncio.get_running_loop().time()
+    except RuntimeError:
+        return time.monotonic()
 
 
 @pytest.fixture

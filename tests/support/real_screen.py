@@ -39,8 +39,10 @@ async def real_screen(
 
 
 async def until(pilot: Pilot[int], true: Callable[[], object]) -> None:
-    """Let the app work until a condition holds."""
+    """Let the app work until a condition holds; look the less often, the longer it takes."""
+    moment = 0.01
     async with asyncio.timeout(PATIENCE):
         while not true():
-            await pilot.pause(0.01)
+            await pilot.pause(moment)
+            moment = min(moment * 1.1, 0.1)
             pilot.app.tick()  # type: ignore[attr-defined]

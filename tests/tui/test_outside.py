@@ -318,6 +318,7 @@ async def test_the_heading_names_a_change_while_the_page_is_shown(
         await until(pilot, lambda: "on the disk" not in heading())
 
 
+@pytest.mark.real
 async def test_a_disk_that_hangs_holds_only_the_keys_and_escape_leaves(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -346,6 +347,7 @@ async def test_a_disk_that_hangs_holds_only_the_keys_and_escape_leaves(
         assert app.screen is app.main and sent(pilot) == []
 
 
+@pytest.mark.real
 async def test_a_stop_while_the_file_is_saved_keeps_the_download_back(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -257,6 +257,7 @@ def disk_that_hangs(app: MultidropApp) -> threading.Event:
     return gate
 
 
+@pytest.mark.real
 async def test_keys_that_are_typed_while_a_slow_disk_reads_the_file_wait_for_it(folder: Path) -> None:
     async with page(folder, file="") as pilot:
         app = pilot.app
@@ -272,6 +273,7 @@ async def test_keys_that_are_typed_while_a_slow_disk_reads_the_file_wait_for_it(
         await until(pilot, lambda: shown(pilot).editor.text == TEXT.replace("PG 1", "PG 1Z", 1))
 
 
+@pytest.mark.real
 async def test_who_leaves_the_page_while_a_disk_hangs_has_the_keys_again(folder: Path) -> None:
     async with page(folder, file="") as pilot:
         app = pilot.app

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import functools
 import math
 import re
 from collections.abc import Awaitable, Callable, Sequence
@@ -15,6 +17,7 @@ from multidrop.base.errors import TransportLost
 from multidrop.dialects.values import IO, VARIABLES, Conditions, Reading, Readings
 from multidrop.drives.events import Conditioned, Sample, Traffic, Valued
 from multidrop.drives.stopping import Fate
+from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, ProgramSeen, SettingsRead
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import Filter, Series
@@ -63,7 +66,10 @@ def drawn(
         await act(pilot, session)
         await settle(pilot)
 
-    return compare(make_app(session, theme=theme), terminal_size=SIZES[size], run_before=run)
+    app = make_app(session, theme=theme)
+    with contextlib.closing(VirtualLoop()) as loop:
+        app.run = functools.partial(app.run, loop=loop)  # type: ignore[method-assign]
+        return compare(app, terminal_size=SIZES[size], run_before=run)
 
 
 def after(*keys: str, later: float = 0.0) -> Act:

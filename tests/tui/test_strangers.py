@@ -10,7 +10,7 @@ from tests.support.fake_session import painted
 from tests.support.foreign_device import device
 from tests.support.real_screen import real_screen, until
 
-pytestmark = pytest.mark.tui
+pytestmark = [pytest.mark.tui, pytest.mark.real]
 
 
 async def test_nothing_is_polled_and_a_typed_line_is_all_that_is_sent(tmp_path: Path) -> None:

@@ -22,8 +22,8 @@ from tests.support.pty_screen import demo
 from tests.support.real_screen import real_screen, until
 
 LIMIT = "[bus.drive.world]\nlimit_plus = 100000"
-KEYS = ("ctrl+a", "enter")
-"""The job "why it is the worst"."""
+KEYS = ("ctrl+a", "wait:500", "enter")
+"""The job "why it is the worst", which is seen before it is chosen."""
 
 
 def shown(app) -> str:

@@ -9,16 +9,13 @@ import tempfile
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
-from unittest import mock
 
 import pytest
-from textual import _time
 from textual.geometry import Region
 from textual.pilot import Pilot
 
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample
-from multidrop.shell.batch.virtual_loop import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, OnBus, ProgramRead
 from multidrop.shell.session import Session
@@ -73,21 +70,17 @@ def carried(app: MultidropApp) -> list[float]:
 
 @pytest.mark.parametrize("moves", [(), MOVES], ids=["at rest", "three move"])
 @pytest.mark.parametrize("size", [(120, 40), (200, 50)])
-def test_most_rows_carry_something_in_each_half_of_the_width(size: tuple[int, int], moves: tuple[str, ...]) -> None:
-    async def look() -> list[float]:
-        async with the_demo(size) as (pilot, app):
-            for line in moves:
-                app.main.entry.value = line
-                await pilot.press("enter")
-                await asyncio.sleep(0.3)
-            await settle(pilot)
-            assert ("plot last" in app.main.lines("panel").plain + app.main.lines("far").plain) is bool(moves)
-            return carried(app)
-
-    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
-        clock = mock.patch.object(_time, "get_time", runner.get_loop().time)
-        with clock:
-            left, right = runner.run(look())
+async def test_most_rows_carry_something_in_each_half_of_the_width(
+    size: tuple[int, int], moves: tuple[str, ...]
+) -> None:
+    async with the_demo(size) as (pilot, app):
+        for line in moves:
+            app.main.entry.value = line
+            await pilot.press("enter")
+            await asyncio.sleep(0.3)
+        await settle(pilot)
+        assert ("plot last" in app.main.lines("panel").plain + app.main.lines("far").plain) is bool(moves)
+        left, right = carried(app)
     assert min(left, right) >= ENOUGH, (left, right)
 
 

@@ -132,7 +132,7 @@ class Keyboard:
 
     def turn_deaf(self) -> None:
         """Discard keys until a pause: the screen changed by itself, and the person has not seen it yet."""
-        self._deaf_until, self._deaf = time.monotonic() + DEAF_TIME, 0
+        self._deaf_until, self._deaf = self._now() + DEAF_TIME, 0
         if not self._held:
             self._dropped = ""
         waited = list(self._waiting)
@@ -149,14 +149,18 @@ class Keyboard:
             return event.key not in getattr(self._app.screen, "STOPS", ())
         return isinstance(event, events.Paste)
 
+    @staticmethod
+    def _now() -> float:
+        return asyncio.get_running_loop().time()
+
     def hear(self) -> None:
         """Let keys count at once: a stop closed what had appeared under them."""
         self._deaf_until = 0.0
 
     def _not_heard(self) -> bool:
-        if time.monotonic() >= self._deaf_until:
+        if self._now() >= self._deaf_until:
             return False
-        self._deaf_until = time.monotonic() + DEAF_TIME
+        self._deaf_until = self._now() + DEAF_TIME
         self._deaf += 1
         if self._deaf == 1:
             self._warn(EARLY)
