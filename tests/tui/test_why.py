@@ -17,13 +17,13 @@ from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.screens.why import WhyPage, error_lines, facts, helping
 from tests.support.cases import for_each
 from tests.support.cell_session import ETHERNET, CellSession, bus, drive, party, pmx
-from tests.support.fake_session import AT_LIMIT, a_move, a_talk, demo_session, on_screen, press, readable
+from tests.support.fake_session import AT_LIMIT, a_move, a_talk, demo_session, emit, on_screen, press, readable
 from tests.support.pty_screen import demo
 from tests.support.real_screen import real_screen, until
 
 LIMIT = "[bus.drive.world]\nlimit_plus = 100000"
-KEYS = ("ctrl+a", "wait:500", "enter")
-"""The job "why it is the worst", which is seen before it is chosen."""
+KEYS = ("ctrl+a", "enter")
+"""The job "why it is the worst"."""
 
 
 def shown(app) -> str:
@@ -36,7 +36,7 @@ async def test_two_keys_say_why_the_worst_drive_is_in_trouble(size: tuple[int, i
     async with on_screen(demo_session(), *size) as (pilot, app, session):
         session.buses["pmx"].lost = None
         read = [each for each in a_move(session) if not isinstance(each.event, Silent)]
-        session.emit(*read, *a_talk(session))
+        await emit(pilot, *read, *a_talk(session))
         await press(pilot, *KEYS)
         assert isinstance(app.screen, WhyPage) and session.place == ("press", "b")
         page = shown(app)
