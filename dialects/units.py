@@ -57,6 +57,8 @@ _TRAVEL = re.compile(rf"\s*({DECIMAL})\s*\.\.\s*({DECIMAL})\s+(\S+)\s*", re.ASCI
 _COMMA = re.compile(r"\d,\d")
 _OWN = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 KEYS = ("scale", "zero", "travel", "full_steps")
+FULL_STEPS = 200
+"""Full steps in a turn of a motor of 1.8 degrees, the usual one."""
 
 
 class Takes(Enum):
@@ -289,6 +291,14 @@ class Measure:
         by = self.basis.turn if self.scale.of == TURN else None
         return self.scale.value * self.scale.unit.factor / (by or 1)
 
+    @property
+    def full_step(self) -> Fraction:
+        """One full step of the motor in base units, signed; one count if nothing shows how many counts a turn has."""
+        turn = self.scale.full_steps or FULL_STEPS
+        if self.scale.of == TURN:
+            return self.scale.value * self.scale.unit.factor / turn
+        return self.count * max(self.basis.turn / turn, Fraction(1)) if self.basis.turn else self.count
+
     def native(self, given: Quantity, takes: Takes) -> int:
         """The drive's number for a quantity. Raises Diagnostic where it cannot be that, or rounding spoils it."""
         count, zero = self._factors(given, takes)
@@ -366,6 +376,15 @@ class Measure:
             for takes in Takes
             if self.counts(takes)
         }
+
+    @property
+    def decimals(self) -> int:
+        """Decimal places that a tenth of a full step needs in the scale's unit: 3 for 5 mm a turn, so 0.025 mm a step.
+
+        A scale by the count of a drive that does not report the counts of a turn gets those that one count needs.
+        """
+        finest = self.full_step / 10 if self.full_step != self.count else self.count
+        return max(0, math.ceil(-math.log10(abs(finest / self.scale.unit.factor))))
 
     def _signed(self, takes: Takes) -> Fraction:
         count = self.count / self._rate(takes.per)

@@ -376,7 +376,7 @@ class ScreenModel:
 
 
 def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> ReadoutState:
-    """The state of a whole bus as last read: idle only if every drive was read as stopped, and runs no program.
+    """The state of a whole bus as last read: at rest only if every drive was read at rest and runs no program.
 
     What was read before a stop counts for none that is at rest: the banner says that it is not read yet.
     """
@@ -399,7 +399,7 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> Reado
         readout.program.ran or readout.stopped_since for readout in readouts
     ):
         return ReadoutState.UNKNOWN
-    return ReadoutState.OFF if ReadoutState.NO_CURRENT in states else ReadoutState.IDLE
+    return ReadoutState.NO_CURRENT if ReadoutState.NO_CURRENT in states else ReadoutState.AT_REST
 
 
 def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:

@@ -178,7 +178,7 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
             assert (
                 state in (ReadoutState.MOVING, ReadoutState.DWELL)
                 if runs
-                else state is not ReadoutState.IDLE or tally.stand
+                else state is not ReadoutState.AT_REST or tally.stand
             )
 
         session.subscribe(agree)
@@ -188,7 +188,7 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
         session.stop()
         model.stopped(session.now())
         await asyncio.sleep(5.0)
-        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is ReadoutState.IDLE
+        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is ReadoutState.AT_REST
         for each in polls:
             each.close()
 

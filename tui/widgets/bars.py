@@ -155,7 +155,7 @@ class Tab:
 
 def tab_spans(tab: Tab) -> list[Span]:
     """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST_TAB_NAME)} ", f"{tab.state.sign} {tab.state.word:<6}")
+    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST_TAB_NAME)} ", f"{tab.state.sign} {tab.state.word:<7}")
 
 
 def _named(tab: Tab, name: str = "") -> list[Span]:
