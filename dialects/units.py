@@ -292,12 +292,12 @@ class Measure:
         return self.scale.value * self.scale.unit.factor / (by or 1)
 
     @property
-    def full_step(self) -> Fraction:
-        """One full step of the motor in base units, signed; one count if nothing shows how many counts a turn has."""
+    def full_step(self) -> Fraction | None:
+        """One full step of the motor in base units, signed; None if nothing shows how many counts a turn has."""
         turn = self.scale.full_steps or FULL_STEPS
         if self.scale.of == TURN:
             return self.scale.value * self.scale.unit.factor / turn
-        return self.count * max(self.basis.turn / turn, Fraction(1)) if self.basis.turn else self.count
+        return self.count * self.basis.turn / turn if self.basis.turn else None
 
     def native(self, given: Quantity, takes: Takes) -> int:
         """The drive's number for a quantity. Raises Diagnostic where it cannot be that, or rounding spoils it."""
@@ -383,7 +383,7 @@ class Measure:
 
         A scale by the count of a drive that does not report the counts of a turn gets those that one count needs.
         """
-        finest = self.full_step / 10 if self.full_step != self.count else self.count
+        finest = self.full_step / 10 if self.full_step is not None else self.count
         return max(0, math.ceil(-math.log10(abs(finest / self.scale.unit.factor))))
 
     def _signed(self, takes: Takes) -> Fraction:

@@ -37,7 +37,7 @@ class ReadoutState(Enum):
     AT_REST = ("■", "at rest", "text")
     """Of a line: every drive of it was read at rest, and no program runs."""
     NO_CURRENT = ("□", "no current", "strong")
-    """At rest without current to hold the load: disabled, or switched off at rest. Of a line: so is one of its drives."""
+    """At rest without current to hold the load: disabled, or switched off. Of a line: one of its drives."""
     DWELL = ("▷", "dwell", "motion")
     """At rest in a program, which can move the drive at any time. Of a line: a program runs in one of its drives."""
     MOVING = ("▶", "moving", "motion")

@@ -220,11 +220,11 @@ async def test_a_disabled_axis_has_its_own_state_and_takes_no_move() -> None:
     async with on_screen() as (pilot, app, session):
         for address in "abc":
             await emit(pilot, OnBus("press", Sample(session.time - 0.05, address, 1000, 0)))
-        assert "1 press ■ idle" in app.main.lines("top").plain
+        assert "1 press ■ at rest" in app.main.lines("top").plain
         await emit(pilot, OnBus("press", Conditioned(session.time, "a", (Conditions(disabled="DE=0"),))))
-        assert "1 press □ off" in app.main.lines("top").plain
+        assert "1 press □ no current" in app.main.lines("top").plain
         status = app.main.lines("status").plain
-        assert "a gantry □ no current" in status and "b clamp  ■ stopped" in status
+        assert "a gantry □ no current" in status and "b clamp  ■ at rest" in status
         await press(pilot, "ctrl+n")
         await press(pilot, "right")
         page = app.screen

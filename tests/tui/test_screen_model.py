@@ -67,7 +67,7 @@ def test_an_old_state_stays_with_its_age_until_the_next_is_read(model: ScreenMod
         model.bus("press"), ["a"], 4.0
     )
     model.take(sample(4.1, 0))
-    assert readout(model).words(4.2) == "stopped"
+    assert readout(model).words(4.2) == "at rest"
     assert readout(model).words(14.0) == "at rest 10 s ago"
     assert not bus_old(model.bus("press"), ["a"], 4.2)
 
@@ -101,7 +101,7 @@ def test_what_was_read_before_a_line_was_sent_is_old(model: ScreenModel) -> None
         readout(model, address).period = 2.0
         model.take(sample(1.0, 0, address=address))
     model.take(Entered(2.0, "@b MR 5", By.OPERATOR, "press", "b"))
-    assert readout(model, "a").words(2.1) == "stopped"
+    assert readout(model, "a").words(2.1) == "at rest"
     assert readout(model, "b").words(2.1) == "at rest 1 s ago"
     model.take(sample(2.2, 700, address="b"))
     assert readout(model, "b").words(2.3) == "moving"
@@ -113,7 +113,7 @@ def test_a_value_that_is_read_anew_ten_times_a_second_does_not_flicker_with_ever
     readout(model).period = 0.1
     model.take(sample(1.0, 0))
     model.take(Entered(1.05, "PR P", By.OPERATOR, "press", "a"))
-    assert readout(model).words(1.1) == "stopped"
+    assert readout(model).words(1.1) == "at rest"
 
 
 def test_the_rate_is_counted_and_not_promised(model: ScreenModel) -> None:

@@ -121,7 +121,7 @@ async def test_it_stops_when_the_terminal_is_too_small() -> None:
 async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_unread() -> None:
     async with on_screen() as (pilot, app, session):
         await emit(pilot, *a_move(session))
-        assert "b clamp  ■ stopped" in app.main.lines("status").plain
+        assert "b clamp  ■ at rest" in app.main.lines("status").plain
         await press(pilot, "ctrl+x")
         assert "b clamp  ■ 0.9 s ago" in app.main.lines("status").plain
         assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}

@@ -58,7 +58,8 @@ class DriveList(NamedTuple):
             text, role = column.span(place, view, cells)
             if len(row) == 1 and chosen:
                 role = "accent"
-            row.append((column.put(text, cells - beyond) + " " * column.gap, role))
+            shown_text = column.put(text, cells - beyond) + " " * column.gap
+            row.append((ActionText(shown_text, text.action) if isinstance(text, ActionText) else shown_text, role))
             beyond = max(0, len(text) - cells) if column.right else 0
         room = width - width_of(row)
         text, role = shown[-1][0].span(place, view, room)
@@ -82,7 +83,7 @@ def _near_name(place: DriveOnLine, view: View, cells: int) -> Span:
     name = name_of(glance) if own and (glance.address or glance.label) else place.name
     if place.axis is not None:
         name = place.axis.axis.rjust(len(glance.address) + 1)
-    return ActionText(fit(visible(name), cells), f"act.select({glance.address!r}, {place.bus!r})"), "text"
+    return ActionText(visible(name), f"act.select({glance.address!r}, {place.bus!r})"), "text"
 
 
 def _state(place: DriveOnLine, view: View, cells: int) -> Span:

@@ -162,7 +162,7 @@ def line_trouble(view: View, bus: Bus) -> tuple[Span, str]:
         return ("· searching", "dim"), "its drives are being searched for"
     if bus.silent:
         return (f"{ReadoutState.SILENT.sign} {ReadoutState.SILENT.word}", "error"), "no drive replies"
-    if bus.link.reserved is not None:
+    if bus.name in view.session.raw:
         return ("· raw", "dim"), "typed text goes to the port"
     return ("", "dim") if bus.drives else ("· no drive", "dim"), ""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from multidrop.dialects.values import UNREAD
 from multidrop.drives.bus import Bus
 from multidrop.tui.panels.drive import LIMITS, drive_rows
 from multidrop.tui.panels.drives import line_trouble
@@ -119,7 +120,7 @@ def _asked_by(chosen: Glance, view: View) -> Iterator[tuple[str, str]]:
         actions = drive.family.values.actions
         if conditions.clears:
             yield conditions.clears, f"clears it: {conditions.error_text}"
-        elif actions.error and view.works:
+        elif conditions.error == UNREAD and actions.error and view.works:
             yield drive.family.question(actions.error) or "", "read and clear the error"
         if conditions.error > 0:
             yield f"/help {conditions.error}", "what the error means"

@@ -148,7 +148,7 @@ PANELS: tuple[Panel, ...] = (
     Panel("drives", "drives", drives_rows, 4, 24, _ALL, "every drive of every line in a row"),
     Panel("program", program_title, program_rows, 3, 60, _ALL, "the lines around the current one", shows=program_shows),
     Panel("next", "next", next_rows, 3, 15, _FREE, "what fits the state in front of you, and the macros on keys"),
-    Panel("plot", plot_title, panel_rows, 8, 60, _FAST, "velocity and position of what moves", shows=plot_shows),
+    Panel("plot", plot_title, panel_rows, 10, 60, _FAST, "velocity and position of what moves", shows=plot_shows),
     Panel("traffic", traffic_title, traffic_rows, 3, 40, _FREE, "the bytes of the line, both ways", first=False),
     Panel("log", log_title, log_rows, 2, 12, _FREE, "the session log: where, how large, its last entries", first=False),
 )
@@ -183,11 +183,11 @@ class ShownPanels:
         return [[panel(self._alone)]] if self._alone else []
 
     def places(self, wanted: Places) -> list[Place]:
-        """These places of a wide screen with the panels in them. One is there while its first panel is shown."""
+        """These places of a wide screen with the panels that are shown in them; one without any is left out."""
         return [
-            [panel(name) for name in place if self._by_hand.get(name, True)]
+            shown
             for place in wanted
-            if self._by_hand.get(place[0], panel(place[0]).first)
+            if (shown := [panel(name) for name in place if self._by_hand.get(name, panel(name).first)])
         ]
 
     def switch(self, name: str, on: bool, wide: bool) -> None:

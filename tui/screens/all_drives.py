@@ -17,7 +17,7 @@ from multidrop.tui.widgets.lines import Row, beside, spread
 
 WIDE_FROM, LEAST_ROOM = 110, 16
 """Least width of the page, and least rows below the list, with the chosen drive there."""
-HEAD_ROWS, FEWEST = 6, 8
+HEAD_ROWS, FEWEST = 7, 8
 """Rows of the page that neither list drives nor show the chosen one, and the least rows of the list."""
 
 

@@ -82,8 +82,8 @@ HALF = 60
 PLAIN = ("panel", "side", "rule-below", "tour", "status", "label", "hint")
 """Parts that are only rows."""
 MENU_WIDTH = 64
-PANEL_SHARE = 0.5
-"""Share of the transcript's height that a panel takes on a narrow screen."""
+PANEL_SHARE, WIDE_SHARE = 0.5, 0.55
+"""Share of the height that the panels below the transcript take, on a narrow and on a wide screen."""
 
 
 class MainScreen(Framed):
@@ -174,7 +174,8 @@ class MainScreen(Framed):
         side = side_width(width)
         self.lines("side").styles.width = side
         self.lines("status").display = not wide
-        share = int((self.size.height - 7) * PANEL_SHARE) if not wide or self.size.height >= TALL else FEW_ROWS
+        room = self.size.height - 7
+        share = FEW_ROWS if wide and self.size.height < TALL else int(room * (WIDE_SHARE if wide else PANEL_SHARE))
         self.lines("panel").styles.height = max([share, *(place[0].least + 1 for place in columns.get("panel", []))])
         beside = side if columns.get("side") else 0
         self.junctions = (width - beside,) if beside else ()
