@@ -291,14 +291,6 @@ class Measure:
         by = self.basis.turn if self.scale.of == TURN else None
         return self.scale.value * self.scale.unit.factor / (by or 1)
 
-    @property
-    def full_step(self) -> Fraction | None:
-        """One full step of the motor in base units, signed; None if nothing shows how many counts a turn has."""
-        turn = self.scale.full_steps or FULL_STEPS
-        if self.scale.of == TURN:
-            return self.scale.value * self.scale.unit.factor / turn
-        return self.count * self.basis.turn / turn if self.basis.turn else None
-
     def native(self, given: Quantity, takes: Takes) -> int:
         """The drive's number for a quantity. Raises Diagnostic where it cannot be that, or rounding spoils it."""
         count, zero = self._factors(given, takes)
@@ -376,15 +368,6 @@ class Measure:
             for takes in Takes
             if self.counts(takes)
         }
-
-    @property
-    def decimals(self) -> int:
-        """Decimal places that a tenth of a full step needs in the scale's unit: 3 for 5 mm a turn, so 0.025 mm a step.
-
-        A scale by the count of a drive that does not report the counts of a turn gets those that one count needs.
-        """
-        finest = self.full_step / 10 if self.full_step is not None else self.count
-        return max(0, math.ceil(-math.log10(abs(finest / self.scale.unit.factor))))
 
     def _signed(self, takes: Takes) -> Fraction:
         count = self.count / self._rate(takes.per)

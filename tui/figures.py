@@ -7,9 +7,10 @@ decimals, as many as a tenth of a full step needs, so that nothing jumps while i
 from __future__ import annotations
 
 from functools import lru_cache
+from math import ceil, log10
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.dialects.units import Takes
+from multidrop.dialects.units import FULL_STEPS, TURN, Takes
 from multidrop.tui.text import digits
 
 if TYPE_CHECKING:
@@ -94,10 +95,23 @@ def _figures(measure: Measure, sure: bool, referenced: bool) -> Figures:
         speed_unit=measure.unit_for(Takes.VELOCITY) if rated else "",
         places=UnitConversion(gain, measure.value(0)),
         speeds=UnitConversion(measure.value(1, Takes.VELOCITY)) if rated else UnitConversion(),
-        decimals=measure.decimals,
+        decimals=decimals_of(measure),
         sign="" if sure else UNSURE,
         travel=None if ends is None else (ends[0], ends[1]),
     )
+
+
+def decimals_of(measure: Measure) -> int:
+    """Decimal places that a tenth of a full step needs in the scale's unit: 3 for 5 mm a turn, so 0.025 mm a step.
+
+    A scale by the count of a drive that does not report the counts of a turn gets those that one count needs.
+    """
+    scale, turn = measure.scale, measure.scale.full_steps or FULL_STEPS
+    if scale.of == TURN:
+        finest = scale.value * scale.unit.factor / turn / 10
+    else:
+        finest = measure.count * measure.basis.turn / turn / 10 if measure.basis.turn else measure.count
+    return max(0, ceil(-log10(abs(finest / scale.unit.factor))))
 
 
 def fixed(value: float, decimals: int, sign: str = "-") -> str:
