@@ -287,7 +287,7 @@ def difference_words(axis: Readout) -> str:
 NUMBER = 12
 """Width of the longest position, -2147483648, and a space."""
 COMMANDED = "commanded"
-"""Said of a position that no encoder shows: whether the motor followed is not known."""
+"""Said of a position that no encoder shows: whether the motor followed is unknown."""
 WORDS = {STATED: "travel", SOFTWARE: "software limits", LEARNT: "between limit switches", SEEN: "seen so far"}
 
 

@@ -1,6 +1,6 @@
 """What else is known of the selected drive, and what to press next.
 
-All of it is known without a message: nothing here is a reason to read, and what is not known is left out. Times are of
+All of it is known without a message: nothing here is a reason to read, and unknown facts are left out. Times are of
 the day, so that a row that nothing happens to is not painted again.
 """
 
@@ -33,7 +33,7 @@ FAMILIAR = (
 
 
 def facts_of(view: View, bus: Bus, glance: Glance) -> Iterator[tuple[str, str]]:
-    """Units, program, last error and last line of a drive, each as a word and a text; what is not known is left out."""
+    """Units, program, last error and last line of a drive, each as a word and a text; unknown ones are left out."""
     session, readout = view.session, glance.readout
     drive = bus.drives[glance.address]
     for axis in readout.axes:
