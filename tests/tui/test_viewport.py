@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from multidrop.shell.roles import EVERYTHING, Filter
 from multidrop.tui.screen_model import Record
-from multidrop.tui.widgets.viewport import MOST_BETWEEN, Index, Picked, RecordFilter, Records, RecordSearch, VisibleRecords
+from multidrop.tui.widgets.viewport import (
+    MOST_BETWEEN,
+    Index,
+    Picked,
+    RecordFilter,
+    Records,
+    RecordSearch,
+    VisibleRecords,
+)
 from tests.support.cases import for_each
 
 TALK = [
