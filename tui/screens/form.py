@@ -31,7 +31,7 @@ class FormRow(NamedTuple):
     group: str = ""
     """A heading above it, where it differs from that of the row before."""
     missing: str = "–"
-    """What is shown in place of an empty value."""
+    """What is shown instead of an empty value."""
 
 
 class Form(ABC):

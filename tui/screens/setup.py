@@ -23,7 +23,7 @@ NAME, SCALE, TRAVELS, ZERO, FULL_STEPS = "name", "scale", "travel", "zero", "ful
 GUARD, ASK_BEFORE, SAVE_AS = "guard", "ask_before", "save_as"
 OF_AXIS = (SCALE, TRAVELS, ZERO, FULL_STEPS)
 ABOUT = {
-    NAME: "letters and digits, such as gantry; shown in place of the address. Empty: no name",
+    NAME: "letters and digits, such as gantry; shown instead of the address. Empty: no name",
     SCALE: "how far one turn of the motor goes, as in 5 mm/turn, or one step, as in 0.4 um/step; a minus turns the "
     "direction. Units: m, cm, mm, um, in, deg, rad, turn. Empty: no scale",
     TRAVELS: "where the axis may move, as in 0..300 mm; a move that leaves it asks first. Empty: no travel",
