@@ -11,13 +11,13 @@ after another one is the keyboard's repetition. What does not count is dropped a
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
-from string import ascii_letters, digits
+from string import ascii_letters, digits, punctuation
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
+from multidrop.base.errors import Diagnostic
 from multidrop.base.text import counted
 from multidrop.dialects.controls import (
     BY,
@@ -32,11 +32,14 @@ from multidrop.dialects.controls import (
     Control,
     Controls,
 )
+from multidrop.dialects.units import Takes
+from multidrop.shell.amounts import Amount, AmountReader
+from multidrop.tui.key_table import SHEETS, shown_key
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, ReadoutState
-from multidrop.tui.screens.page import PageHost, SendingPage
-from multidrop.tui.text import fit
+from multidrop.tui.screens.page import PageHost, SendingPage, show_rows
+from multidrop.tui.text import at_words, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 REPETITION = 0.2
@@ -75,6 +78,16 @@ class Jog:
 
     def obstacle(self, readout: Readout, axis: Readout, state: ReadoutState, now: float) -> str:
         """The reason for which no move may start now; empty: it may."""
+        if restless := self.restless(readout, axis, state, now):
+            return restless
+        if axis.conditions is not None and axis.conditions.disabled:
+            return f"no current in the motor ({axis.conditions.disabled})"
+        if axis.conditions is not None and axis.conditions.blocked:
+            return axis.conditions.blocked
+        return "a program runs" if readout.program.name else ""
+
+    def restless(self, readout: Readout, axis: Readout, state: ReadoutState, now: float) -> str:
+        """What leaves open whether the axis rests; empty: it rests."""
         if state not in READ or axis.last is None:
             return f"it is {'not read yet' if state is ReadoutState.UNKNOWN else state.word}"
         if state is ReadoutState.MOVING or axis.last.velocity != 0:
@@ -83,18 +96,27 @@ class Jog:
             return "a line is on its way"
         if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):
             return "it has not been read at rest since the last line"
-        if axis.conditions is not None and axis.conditions.disabled:
-            return f"no current in the motor ({axis.conditions.disabled})"
-        if axis.conditions is not None and axis.conditions.blocked:
-            return axis.conditions.blocked
-        return "a program runs" if readout.program.name else ""
+        return ""
 
 
-STEPS = tuple(10**n for n in range(8))
-"""The sizes of a step that keys choose."""
-FIRST_STEP = 100
-NUMBERED = {"m": (TO, "position"), "b": (BY, "distance"), "l": ("", "step")}
-"""Keys that ask for a number: the control that takes it, and what it is. An empty name sets the step."""
+FIRST_STEP = "100"
+"""The length of a step until a person chooses one, in the drive's own counts."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A key that asks for an amount. `control`: the one that takes it; empty: it is the length of a step."""
+
+    control: str
+    what: str
+    takes: Takes
+
+
+ENTRIES = {
+    "m": Entry(TO, "move to a position", Takes.PLACE),
+    "b": Entry(BY, "move by a distance", Takes.DISTANCE),
+    "l": Entry("", "length of a step", Takes.DISTANCE),
+}
 SPACE = "space"
 KEYED = {"-": HOME_MINUS, "+": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
 """Keys of controls. Enter sends them, apart from the stop; a direction counts after `h`."""
@@ -108,7 +130,13 @@ WORDS = {
     DISABLE: "disable",
 }
 NO_CONTROLS = "this family has no controls"
-WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
+LEFT = "nothing was sent: the entry was left without Enter"
+KEYS = "; ".join(
+    f"{key.shown} {key.word or key.about.split(':')[0]}" for key in SHEETS["controls"].keys if key.word or key.name
+)
+"""The keys that work, for a person who pressed another one."""
+PRINTED = [*ascii_letters, *digits, *(each for each in punctuation if each != ","), "comma"]
+"""Every key that prints something."""
 KEY = 9
 WORD = 10
 LINE = 22
@@ -119,11 +147,13 @@ class ControlsPage(SendingPage):
 
     SHEET = "controls"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding(letter, "drop", show=False) for letter in ascii_letters + digits if letter not in "lmbhed"
+        Binding(key, f"unknown({key!r})", show=False)
+        for key in PRINTED
+        if shown_key(key) not in {shown_key(own) for each in SHEETS["controls"].keys for own, _, _ in each.single}
     ]
     WANTS = frozenset({"motion", "conditions"})
     STOPS = frozenset({"space"})
-    PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
+    PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "asked": 1, "number": None, "said": None}
     FIELD = "number"
 
     def __init__(self, host: PageHost) -> None:
@@ -135,6 +165,8 @@ class ControlsPage(SendingPage):
         """The next key may be the direction of a homing."""
         self._place = host.session.place
         self._view: View | None = None
+        self._before = ""
+        """What the entry held before the last key."""
 
     def on_mount(self) -> None:
         """Hide the field until a number is asked for; what failed before is not the page's."""
@@ -152,7 +184,7 @@ class ControlsPage(SendingPage):
             self._place, self._axis, self._jog = place, 0, Jog()
         asked = self.asked
         if asked is not None and asked.overtaken(self.host.session):
-            self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
+            self._close("stopped; the entry was not used" if asked.place == place else "another drive is selected")
         begun = self.begun
         if begun is not None and begun.overtaken(self.host.session):
             self.begun = None
@@ -168,7 +200,9 @@ class ControlsPage(SendingPage):
         self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
         self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 19)))
         self.lines("controls").put(self._rows(view, glance, width))
-        self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
+        show_rows(self.lines("asked"), self._asked_rows(width))
+        said: list[Row] = [((f" {row}", self.said[1]),) for row in at_words(self.said[0], width - 2)]
+        show_rows(self.lines("said"), said or [((" ", "text"),)])
         self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
@@ -178,14 +212,17 @@ class ControlsPage(SendingPage):
         axes = glance.readout.axes
         axis = axes[min(self._axis, len(axes) - 1)]
         other = "   Tab chooses the axis" if len(axes) > 1 else ""
-        unit = unit_of(axis, glance.unit)
+        reader = self._reader(glance, axis)
+        step = self._step(reader)
+        other_way = reader.other(step, Takes.DISTANCE)
         head: list[Span] = [
             ("─ ", "rule"),
             (f"jog {axis.axis}".rstrip() + "  ", "dim"),
-            (f"{self.step} {unit}", "strong"),
+            (step.typed if step.given is not None else f"{step.typed} {reader.counts(Takes.DISTANCE)}", "strong"),
+            (f" = {other_way}" if other_way else "", "text"),
         ]
         jog = controls[BY]
-        minus, plus = (self._shown(jog, axis, sign * self.step) for sign in (-1, 1))
+        minus, plus = (", ".join(self._filled(jog, axis, step.times(sign))) for sign in (-1, 1))
         ready = self._jog.obstacle(glance.readout, axis, glance.state(), view.now)
         head.append((f"   ↑↓ choose the step, l types it{other} ", "dim"))
         rows: list[Row] = [
@@ -194,8 +231,9 @@ class ControlsPage(SendingPage):
             ((f" {fit('', KEY)}", "text"), self._readiness(ready)),
             (("─ ", "rule"), ("move ", "dim"), ("─" * max(0, width - 7), "rule")),
         ]
-        for key, name in ((key, name) for key, (name, _) in NUMBERED.items() if name):
-            rows.append(_control_row(key, name, controls[name], "…", width))
+        for key, entry in ENTRIES.items():
+            if entry.control:
+                rows.append(_control_row(key, entry.control, controls[entry.control], "…", width))
         for key, name in KEYED.items():
             rows.append(_control_row(key, name, controls[name], "", width))
         return rows
@@ -209,10 +247,60 @@ class ControlsPage(SendingPage):
             return f"ready{dropped}", "text" if dropped else "dim"
         return f"a press is dropped now: {why}{dropped}", "motion" if why == "it moves" else "strong"
 
+    def _reader(self, glance: Glance, axis: Readout) -> AmountReader:
+        """Return what reads amounts for an axis of the selected drive."""
+        drive = self.host.session.selected
+        assert drive is not None
+        return AmountReader(self.host.session.units, drive, axis.axis, unit_of(axis, glance.unit))
+
+    def _step(self, reader: AmountReader) -> Amount:
+        """The length of a step for an axis. One that the axis cannot have becomes the first one again."""
+        try:
+            return reader.read(self.step, Takes.DISTANCE)
+        except Diagnostic as problem:
+            self.say(f"the step is {FIRST_STEP} again: {problem.message}")
+            self.step = FIRST_STEP
+            return reader.read(FIRST_STEP, Takes.DISTANCE)
+
     @staticmethod
-    def _shown(control: Control, axis: Readout, by: int) -> str:
-        to = axis.last.position + by if axis.last is not None else None
-        return control.shown(by=str(by), to="…" if to is None else str(to))
+    def _filled(control: Control, axis: Readout, by: Amount) -> tuple[str, ...]:
+        """The lines of a move by a distance. Where they take a position, it is in the drive's own counts."""
+        to = axis.last.position + by.number if axis.last is not None else None
+        return control.filled(by=by.text, to="…" if to is None else to)
+
+    def _asked_rows(self, width: int) -> list[Row]:
+        """What is asked for, with what the entry would send; none while nothing is asked."""
+        asked, chosen = self.asked, self._chosen()
+        if asked is None or chosen is None:
+            return []
+        entry, (glance, axis) = ENTRIES[asked.kind], chosen
+        reader = self._reader(glance, axis)
+        label: list[Span] = [(f" {entry.what}: ", "strong"), (reader.asks(entry.takes), "dim")]
+        if self.field.value.strip():
+            try:
+                amount = self._read(entry, reader)
+            except Diagnostic as problem:
+                label.append((f"   {problem.message}", "motion"))
+            else:
+                label.append((f"   → {self._preview(entry, axis, amount)}", "strong"))
+                other = reader.other(amount, entry.takes)
+                label.append((f"  = {other}" if other else "", "strong"))
+        label.append(("   Enter; Esc ↑↓ Tab leave" if width_of(label) < width - 26 else "", "dim"))
+        return [tuple(label)]
+
+    def _preview(self, entry: Entry, axis: Readout, amount: Amount) -> str:
+        control = self._controls().get(entry.control)
+        if control is None:
+            return f"a step of {amount.typed}"
+        lines = self._filled(control, axis, amount) if entry.control == BY else control.filled(to=amount.text)
+        return ", ".join(lines)
+
+    def _read(self, entry: Entry, reader: AmountReader) -> Amount:
+        """Read the entry. Raises Diagnostic."""
+        amount = reader.read(self.field.value, entry.takes)
+        if not entry.control and amount.number <= 0:
+            raise Diagnostic(f"a step of {amount.typed} is no length", "", "type one above 0")
+        return amount
 
     # Keys
 
@@ -243,23 +331,50 @@ class ControlsPage(SendingPage):
         )
 
     def action_step(self, by: int) -> None:
-        self.begun = None
-        larger = [step for step in STEPS if step > self.step]
-        smaller = [step for step in STEPS if step < self.step]
-        steps = larger[:1] if by > 0 else smaller[-1:]
-        self.step = steps[0] if steps else self.step
+        if self._left():
+            return
+        self.begun, chosen = None, self._chosen()
+        if chosen is None:
+            self.say(self._nothing())
+            return
+        reader = self._reader(*chosen)
+        before = self._step(reader)
+        try:
+            after = reader.read(before.level(by), Takes.DISTANCE)
+        except Diagnostic as problem:
+            self.say(f"the step stays {before.typed}: {problem.message}")
+        else:
+            ends = f"the step stays {before.typed}: there is no {'longer' if by > 0 else 'shorter'} one"
+            self.say(ends if after == before else "", "strong" if after == before else "dim")
+            self.step = after.typed
+
+    def _left(self) -> bool:
+        """Leave the entry, if one is open; return whether it was."""
+        if self.asked is None:
+            return False
+        self._close(LEFT)
+        return True
 
     def action_axis(self) -> None:
-        self.begun = None
-        chosen = self._chosen()
-        if chosen is not None:
-            self._axis = (self._axis + 1) % len(chosen[0].readout.axes)
+        if self._left():
+            return
+        self.begun, chosen = None, self._chosen()
+        if chosen is None:
+            self.say(self._nothing())
+        elif len(axes := chosen[0].readout.axes) == 1:
+            self.say("it has one axis")
+        else:
+            self._axis = (self._axis + 1) % len(axes)
             self._jog = Jog()
+            self.say(f"axis {axes[self._axis].axis} is chosen", "dim")
 
     def action_jog(self, sign: int) -> None:
         """Move by one step, if the drive is known to rest; else drop the press."""
-        self.begun = None
-        self._move(BY, sign * self.step)
+        self.begun, chosen = None, self._chosen()
+        if chosen is None:
+            self.say(self._nothing())
+        else:
+            self._move(BY, self._step(self._reader(*chosen)).times(sign))
 
     def action_do(self, key: str) -> None:
         """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
@@ -280,12 +395,13 @@ class ControlsPage(SendingPage):
 
     def action_go(self) -> None:
         """Send the control that was begun, unless a stop or another drive came in between."""
-        if self.begun is None and self._homing:
+        if self.begun is None:
             self.action_drop()
+            self.say(f"nothing was sent: Enter sends a line that is shown; {KEYS}")
         elif (begun := self.accepted()) is not None:
             name = KEYED[begun.kind]
             if name in (HOME_MINUS, HOME_PLUS):
-                self._move(name, 0)
+                self._move(name, None)
             elif (control := self._controls().get(name)) is not None:
                 self.send(control.filled())
 
@@ -298,6 +414,8 @@ class ControlsPage(SendingPage):
     def action_toward(self, sign: str) -> None:
         if self._homing:
             self.action_do(sign)
+        else:
+            self.say("nothing was sent: h begins a homing, and + or - is its direction then")
 
     def action_drop(self) -> None:
         """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
@@ -305,42 +423,60 @@ class ControlsPage(SendingPage):
             self.begun, self._homing = None, False
             self.say("nothing was sent")
 
+    def action_unknown(self, key: str) -> None:
+        """Name the keys that work, and drop what waits for Enter."""
+        self.begun, self._homing = None, False
+        self.say(f"nothing was sent: {shown_key(key)} does nothing here; {KEYS}")
+
     def action_ask(self, key: str) -> None:
-        self.begun = None
+        self.begun, self._homing = None, False
         if not self._controls() or self._nothing():
             self.say(self._nothing() or NO_CONTROLS)
             return
-        self.ask_for(key, "", f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop")
+        self._before = ""
+        self.ask_for(key, "", "")
 
     def edited(self, text: str) -> None:
-        """Take a blank, which no number has, as the key of the stop."""
-        if " " in text:
-            self.field.value = text.replace(" ", "")
-            self.action_do(SPACE)
+        """Take a blank as the key of the stop, unless it divides a number from its unit while the axis rests."""
+        before, self._before = self._before, text
+        if len(text) != len(before) + 1 or text.count(" ") <= before.count(" "):
+            return  # pasted, or no blank
+        if before.strip()[-1:].isdigit() and " " not in before and self._rests():
+            return
+        self._before = before
+        self.field.value = before
+        self.action_do(SPACE)
+
+    def _rests(self) -> bool:
+        """Whether the chosen axis is known to rest."""
+        chosen, host = self._chosen(), self.host
+        if chosen is None:
+            return False
+        glance, axis = chosen
+        now = host.session.now()
+        self._jog.look(now, idle=host.outbox.idle)
+        return not self._jog.restless(glance.readout, axis, glance.state(), now)
 
     def typed(self, text: str) -> None:
-        asked = self.asked
-        if asked is None or asked.overtaken(self.host.session):
-            self._close("the number was not used")
+        asked, chosen = self.asked, self._chosen()
+        if asked is None or chosen is None or asked.overtaken(self.host.session):
+            self._close("the entry was not used")
             return
-        name, what = NUMBERED[asked.kind]
-        if not WHOLE.fullmatch(text):
-            wrong = f"no {what} {text[:20]}; " if text else ""
-            self.say(f"nothing was sent: {wrong}type a whole number such as -1500")
-            return
-        number = int(text)
-        if not LOW <= number <= HIGH or (not name and number <= 0):
-            low = LOW if name else 1
-            self.say(f"nothing was sent: {what} {number} is out of range; valid: {low} to {HIGH}")
+        entry = ENTRIES[asked.kind]
+        try:
+            amount = self._read(entry, self._reader(*chosen))
+        except Diagnostic as problem:
+            self.say(f"nothing was sent: {problem.message}; {problem.hint}".removesuffix("; "))
             return
         self._close("")
-        if name:
-            self._move(name, number)
+        if entry.control:
+            self._move(entry.control, amount)
         else:
-            self.step = number
+            self.step = amount.typed
+            self.say(f"the step is {amount.typed}", "dim")
 
-    def _move(self, name: str, number: int) -> None:
-        """Start a move, if the drive is known to rest."""
+    def _move(self, name: str, amount: Amount | None) -> None:
+        """Start a move, if the drive is known to rest; None: it takes no amount."""
         chosen, control = self._chosen(), self._controls().get(name)
         if chosen is None or control is None:
             self.say(self._nothing() or NO_CONTROLS)
@@ -349,14 +485,17 @@ class ControlsPage(SendingPage):
         host, state = self.host, glance.state()
         if state in READ and axis.last is not None:
             state = axis.own_state
+        number = amount.number if amount is not None else 0
         to = number if name == TO or axis.last is None else axis.last.position + number
         if not LOW <= to <= HIGH:
             self.say(f"not sent: the end of the move, {to}, is out of range")
             return
         if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
             self.say(f"not sent: {self._jog.why}")
-            return
-        self.send(control.filled(by=number, to=to))
+        elif amount is None:
+            self.send(control.filled())
+        else:
+            self.send(self._filled(control, axis, amount) if name == BY else control.filled(to=amount.text))
 
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
