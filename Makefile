@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 2)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured unmeasured map mutants seams coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
+.PHONY: demo test quick nightly check format lint prose types types-here types-darwin types-win32 contracts measured unmeasured map mutants seams coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -34,7 +34,7 @@ windows: $(VENV)/.dev
 
 # Cheap checks first, side by side: what is wrong is said early. The tests are last, so their summary ends the output.
 check: $(VENV)/.dev
-	$(MAKE) -j lint contracts types
+	$(MAKE) -j lint prose contracts types
 	$(MAKE) seams ONLY=all CHEAP=1
 	$(MAKE) measured
 
@@ -45,6 +45,11 @@ lint: $(VENV)/.dev
 format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# The words to avoid in help, messages and pages, where there are more than accepted. ALL=1: every place; KEEP=1: accept
+# the present number, which only falls.
+prose: $(VENV)/.dev
+	$(BIN)/python -m tests.support.prose $(if $(ALL),--all) $(if $(KEEP),--keep)
 
 types: types-here types-darwin types-win32
 

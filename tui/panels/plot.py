@@ -255,9 +255,10 @@ def _charts(view: View, found: Sequence[ChartGroup], width: int, height: int) ->
             if extent in (None, (0, 0)) and group.word == "velocity" and line.quantity[:3] in positions:
                 continue
             too: Row = ((", its twin too", "dim"),) if line in agreeing else ()
-            words.append((*_words(view, line, extent, velocities.get(line.quantity[:3])), *too))
+            words.append(_within((*_words(view, line, extent, velocities.get(line.quantity[:3])), *too), width))
         if len(words) > SAID:
-            words[SAID - 1 :] = [((f" and {len(words) - SAID + 1} more that do not change", "dim"),)]
+            others = f" and {len(words) - SAID + 1} more that do not change"
+            words[SAID - 1 :] = [_within(((others, "dim"),), width)]
         shown.append(ShownGroup(group, chart, moving, tuple(words)))
     return _stacked(view, shown, window, width, height)
 
@@ -270,6 +271,15 @@ def _take(view: View, group: ChartGroup, window: ColumnWindow) -> tuple[ChartGro
     chart = charts.setdefault(key, Chart())
     extents = chart.take(view.model.traces, [line.quantity for line in group.lines], window)
     return group, chart, {line: extents[line.quantity] for line in group.lines if line.quantity in extents}
+
+
+def _within(row: Row, width: int) -> Row:
+    """A row, cut where it is wider than its room."""
+    kept: list[Span] = []
+    for text, role in row:
+        room = width - width_of(kept)
+        kept.append((text if width_of([(text, role)]) <= room else fit(text, room), role))
+    return tuple(kept)
 
 
 def _agree(twin: PlottedLine, extents: Mapping[PlottedLine, Extent]) -> bool:
