@@ -144,7 +144,7 @@ def _put_marks(marked: MarkedChart, cells: _Cells) -> None:
     urgent = sorted(placed.items(), key=lambda each: (URGENCY[each[1][0].kind], -each[1][0].at))
     for (x, y), (mark, whose) in urgent if marked.texts else ():
         text = whose + mark.short
-        for left, row in ((x, y - 1), (x, y + 1), (x + 2, y), (x + 1 - len(text), y - 1), (x + 1 - len(text), y + 1)):
+        for left, row in ((x, y - 1), (x, y + 1), (x + 2, y), (x - len(text), y - 1), (x - len(text), y + 1)):
             if cells.free(left, row, len(text)):
                 cells.put(left, row, text, MARK if mark.kind is MarkKind.SENT else ALARM)
                 break
