@@ -188,7 +188,7 @@ async def test_what_to_press_has_the_macros_and_the_keys_that_a_person_set() -> 
         await settle(pilot)
         side = app.main.lines("side").plain
         assert "F2           home-all: all axes to their switches" in side and "F3           plays shuttle" in side
-        assert "^A           every drive of every line" in side and "/page macros play, record" in side
+        assert "^A           every drive of every line" in side and "^K           play, record" in side
 
 
 def test_a_program_that_is_not_known_gives_its_room_away() -> None:
