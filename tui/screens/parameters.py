@@ -177,6 +177,9 @@ class SettingsTable:
     def compare(self, name: str, values: dict[str, Value]) -> None:
         self.other, self.at = (name, values), 0
 
+    def end_comparison(self) -> None:
+        self.other, self.only_differing = None, False
+
     def heading(self, view: View, glance: Glance | None, width: int, below: Span) -> Row:
         """The drive, how many settings are shown, and when they were read."""
         name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive selected"
@@ -246,6 +249,15 @@ ASKS = {
     BACKUP: "a name for the new file; Enter reads every setting and writes them to it",
     RESTORE: "a file of settings, from /params backup; Enter shows what differs and asks before it is sent",
 }
+
+
+def settings_of(host: PageHost, name: str) -> dict[str, Value]:
+    """Return the settings of another drive, which were read before. Raises Diagnostic."""
+    bus, _, address = name.rpartition(":")
+    readout = host.model.bus(bus or host.session.selected_bus).readouts.get(address)
+    if readout is None or readout.settings is None:
+        raise Diagnostic("its settings are not read", name, f"/params read {name} reads them")
+    return readout.settings.values
 
 
 class ParametersPage(ListPage, SendingPage):
@@ -355,7 +367,7 @@ class ParametersPage(ListPage, SendingPage):
         readings = self._settings()
         table = self._table
         if table.other is not None and table.other[0] == DEFAULT:
-            self._end_comparison()
+            table.end_comparison()
         elif readings is not None and readings.defaults:
             table.other = (DEFAULT, readings.defaults)
         else:
@@ -377,7 +389,7 @@ class ParametersPage(ListPage, SendingPage):
         if table.other is not None:
             rows_shown = "Show every setting again" if table.only_differing else "Show only what differs"
             actions = {"differing": (rows_shown, self.action_differing), **actions}
-            actions["end"] = ("End the comparison", self._end_comparison)
+            actions["end"] = ("End the comparison", table.end_comparison)
 
         def taken(answer: str | None) -> None:
             if answer is not None:
@@ -385,9 +397,6 @@ class ParametersPage(ListPage, SendingPage):
 
         offers = [ListedChoice(key, words) for key, (words, _) in actions.items()]
         await self.app.push_screen(Choose("Compare the settings", offers), taken)
-
-    def _end_comparison(self) -> None:
-        self._table.other, self._table.only_differing = None, False
 
     def action_differing(self) -> None:
         table = self._table
@@ -447,40 +456,31 @@ class ParametersPage(ListPage, SendingPage):
             self._close("it was not used")
             return
         try:
-            taken = {
-                FILE: self._file,
-                DRIVE: self._drive,
-                EDIT: self._value,
-                BACKUP: self._type_with_file,
-                RESTORE: self._type_with_file,
-            }[asked.kind]
-            taken(asked.name, text)
+            if asked.kind == FILE:
+                self._file(text)
+            elif asked.kind == DRIVE:
+                self._table.compare(text, settings_of(self.host, text))
+                self._close("")
+            elif asked.kind == EDIT:
+                self._value(asked.name, text)
+            else:
+                self._type_with_file(asked.kind, text)
         except Diagnostic as failure:
             self.say(f"nothing was sent: {failure}")
 
-    def _file(self, name: str, text: str) -> None:
+    def _file(self, text: str) -> None:
         asked = self.asked
         self._file_column.show(
             text, self.host.session.selected, lambda: self._close("") if self.asked is asked else None
         )
 
-    def _type_with_file(self, name: str, text: str) -> None:
+    def _type_with_file(self, kind: str, text: str) -> None:
         """Type `/params backup FILE` or `/params restore FILE`, which asks before it sends anything."""
-        kind = self.asked.kind if self.asked is not None else ""
         if not text:
             raise Diagnostic("a file name is needed", f"/params {kind}")
         self._close("")
         self.host.outbox.type(f"/params {kind} {shlex.quote(text)}")
         self._reading = kind == RESTORE
-
-    def _drive(self, name: str, text: str) -> None:
-        bus, _, address = text.rpartition(":")
-        session = self.host.session
-        readout = self.host.model.bus(bus or session.selected_bus).readouts.get(address)
-        if readout is None or readout.settings is None:
-            raise Diagnostic("its settings are not read", text, f"/params read {text} reads them")
-        self._table.compare(text, readout.settings.values)
-        self._close("")
 
     def _value(self, name: str, text: str) -> None:
         drive, present = self.host.session.selected, self._settings()

@@ -301,14 +301,6 @@ class ProgramPage(Page):
             problem = (later or wrong)[0]
             self.editor.move_cursor((problem.line - 1, problem.column - 1), center=True)
 
-    def action_undo(self) -> None:
-        """Take the last change of the text back."""
-        self.editor.action_undo()
-
-    def action_redo(self) -> None:
-        """Make the change again that was taken back."""
-        self.editor.action_redo()
-
     def action_leave(self) -> None:
         self.take_text()
         super().action_leave()
