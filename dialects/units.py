@@ -57,6 +57,8 @@ _TRAVEL = re.compile(rf"\s*({DECIMAL})\s*\.\.\s*({DECIMAL})\s+(\S+)\s*", re.ASCI
 _COMMA = re.compile(r"\d,\d")
 _OWN = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
 KEYS = ("scale", "zero", "travel", "full_steps")
+FULL_STEPS = 200
+"""Full steps in a turn of a motor of 1.8 degrees, the usual one."""
 
 
 class Takes(Enum):

@@ -249,6 +249,11 @@ class Lamp:
     """None: the drive does not report it."""
     output: bool = False
 
+    @property
+    def known(self) -> bool:
+        """False for one that the drive does not report, and for an analog input without a value."""
+        return self.on is not None or self.name == "ai"
+
 
 @dataclass(frozen=True)
 class Pace:
@@ -291,6 +296,8 @@ class Conditions:
     hold_current: int | None = None
     more: tuple[tuple[str, str], ...] = ()
     """Names and values of what only this family has."""
+    commanded: bool = False
+    """The position is the one that was commanded: no encoder shows whether the motor followed."""
     unit: str = "steps"
     speed: str = ""
     """The unit of velocities; empty: `unit` a second."""

@@ -62,6 +62,18 @@ class Unsolicited(NamedTuple):
     """They may be a gateway's greeting: the connection is new, and no drive has replied yet."""
 
 
+class Rested(NamedTuple):
+    """What confirms that one drive came to rest after a stop."""
+
+    stop: int
+    """The number of the stop on its line."""
+    drives: int
+    """How many drives it was for."""
+    name: str
+    places: tuple[tuple[str, int], ...]
+    """Axis and position, counts; the only axis of a drive has no name."""
+
+
 class Notice(NamedTuple):
     """A message for the user: a drive was taken out of program mode, a stop was seen to work."""
 
@@ -69,6 +81,7 @@ class Notice(NamedTuple):
     text: str
     address: str = ""
     warning: bool = False
+    rested: Rested | None = None
 
 
 class Traffic(NamedTuple):

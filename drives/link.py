@@ -148,8 +148,8 @@ class Link:
 
     # Events
 
-    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
-        self.publish(events.Notice(self.now(), text, address, warning))
+    def notify(self, text: str, address: str = "", warning: bool = False, rested: events.Rested | None = None) -> None:
+        self.publish(events.Notice(self.now(), text, address, warning, rested))
 
     # Requests
 

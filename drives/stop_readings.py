@@ -16,8 +16,8 @@ class Activity(NamedTuple):
     """Unsigned, of its fastest axis."""
     runs: bool = False
     """A program runs."""
-    places: str = ""
-    """The positions of its axes; empty: not read."""
+    places: tuple[tuple[str, int], ...] = ()
+    """Axis and position of each of its axes; empty: not read."""
 
     @property
     def none(self) -> bool:
@@ -69,5 +69,5 @@ async def read_activity(drive: Drive, axes: frozenset[str] | None) -> tuple[Acti
     # The only axis of a drive has no name, whatever number its lines give it.
     speed = max((abs(each) for axis, each in speeds if axes is None or not axis.axis or axis.axis in axes), default=0)
     counts = [motion for motion in motions if axes is None or not motion.axis or motion.axis in axes]
-    places = "" if why else ", ".join(str(count.position) for count in counts)
+    places = () if why else tuple((count.axis, count.position) for count in counts)
     return Activity(speed, bool(runs) and not why, places), why

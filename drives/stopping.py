@@ -20,7 +20,7 @@ from functools import partial
 from multidrop.base.isolation import isolated
 from multidrop.dialects import DriveState, Started, StopPiece
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Traffic
+from multidrop.drives.events import Rested, Traffic
 from multidrop.drives.halts import Fate as Fate
 from multidrop.drives.halts import Halt as Halt
 from multidrop.drives.port_journal import GLOBAL
@@ -302,7 +302,9 @@ class Stopping:
                 return  # a later stop of the whole link confirms it, by what is read after that
             for drive, activity in activities.items():  # whether this reading or a poll after it has confirmed that
                 if activity.places and activity.none and halt.fate(drive) is Fate.STANDING:
-                    link.notify(f"{drive.shown}{halt.part_of(drive)}: stopped, velocity 0 at {activity.places}")
+                    name, at = f"{drive.shown}{halt.part_of(drive)}", ", ".join(str(at) for _, at in activity.places)
+                    rested = Rested(halt.number, len(halt.affected), name, activity.places)
+                    link.notify(f"{name}: stopped, velocity 0 at {at}", drive.address, rested=rested)
             active = {
                 drive: activity
                 for drive, activity in activities.items()

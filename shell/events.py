@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from multidrop.base.errors import Diagnostic, DriveError, TransportLost
 from multidrop.dialects.values import Readings
-from multidrop.drives.events import BusEvent
+from multidrop.drives.events import BusEvent, Rested
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
 """The failures that `Session.run` raises, each with one line for a person; anything else is a bug."""
@@ -73,6 +73,9 @@ class Notified:
     bus: str = ""
     warning: bool = False
     outcome: bool = False
+    address: str = ""
+    rested: Rested | None = None
+    """It confirms that the drive at the address came to rest after a stop."""
 
 
 @dataclass(frozen=True)

@@ -423,7 +423,7 @@ class Workspace(Channel):
                 self.publish(Failed(event.at, str(event.error), name))
         elif isinstance(event, Notice):
             text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
-            self.publish(Notified(event.at, text, name, event.warning))
+            self.publish(Notified(event.at, text, name, event.warning, address=event.address, rested=event.rested))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
             self.hooks.tell(self.hooks.changed, bus)

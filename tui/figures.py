@@ -1,7 +1,7 @@
 """The numbers of an axis as they are shown: in engineering units where it has a scale, else as the drive counts.
 
-Each number in units has the form that can be typed back, between braces: `12.50000 mm`. It has a fixed number of
-decimals, as many as one count needs, so that nothing jumps while it changes.
+A number in units can be typed back between braces: `12.500 mm`. It has a fixed number of
+decimals, as many as a tenth of a full step needs, so that nothing jumps while it changes. Files keep all of them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from functools import lru_cache
 from math import ceil, log10
 from typing import TYPE_CHECKING, NamedTuple
 
-from multidrop.dialects.units import Takes
+from multidrop.dialects.units import FULL_STEPS, TURN, Takes
 from multidrop.tui.text import digits
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 UNSURE = "?"
 """The sign of a scale that could not be confirmed since a program began to run."""
-COARSER = 2
+COARSER = 1
 """Decimals that a velocity has less than a position."""
 
 
@@ -51,11 +51,11 @@ class Figures(NamedTuple):
         return fixed(self.places.value(counts), self.decimals) if self.unit else digits(counts)
 
     def place(self, counts: int | None) -> str:
-        """`12.50000 mm`, or `128000`; `–` if it is not known."""
+        """`12.500 mm`, or `128000`; `–` if it is not known."""
         return digits(counts) if counts is None or not self.unit else f"{self.number(counts)} {self.unit}{self.sign}"
 
     def distance(self, counts: int) -> str:
-        """The same with its sign: `+0.50000 mm`."""
+        """The same with its sign: `+0.500 mm`."""
         if not self.unit:
             return f"{counts:+}"
         return f"{fixed(self.places.gain * counts, self.decimals, '+')} {self.unit}{self.sign}"
@@ -66,7 +66,7 @@ class Figures(NamedTuple):
         return fixed(value, max(0, self.decimals - COARSER)) if self.speed_unit else digits(native)
 
     def speed(self, native: int | None) -> str:
-        """`50.000 mm/s`, or `512000`."""
+        """`50.00 mm/s`, or `512000`."""
         if native is None or not self.speed_unit:
             return digits(native)
         return f"{self.rate(native)} {self.speed_unit}{self.sign}"
@@ -95,10 +95,23 @@ def _figures(measure: Measure, sure: bool, referenced: bool) -> Figures:
         speed_unit=measure.unit_for(Takes.VELOCITY) if rated else "",
         places=UnitConversion(gain, measure.value(0)),
         speeds=UnitConversion(measure.value(1, Takes.VELOCITY)) if rated else UnitConversion(),
-        decimals=max(0, ceil(-log10(abs(gain)))),
+        decimals=decimals_of(measure),
         sign="" if sure else UNSURE,
         travel=None if ends is None else (ends[0], ends[1]),
     )
+
+
+def decimals_of(measure: Measure) -> int:
+    """Decimal places that a tenth of a full step needs in the scale's unit: 3 for 5 mm a turn, so 0.025 mm a step.
+
+    A scale by the count of a drive that does not report the counts of a turn gets those that one count needs.
+    """
+    scale, turn = measure.scale, measure.scale.full_steps or FULL_STEPS
+    if scale.of == TURN:
+        finest = scale.value * scale.unit.factor / turn / 10
+    else:
+        finest = measure.count * measure.basis.turn / turn / 10 if measure.basis.turn else measure.count
+    return max(0, ceil(-log10(abs(finest / scale.unit.factor))))
 
 
 def fixed(value: float, decimals: int, sign: str = "-") -> str:

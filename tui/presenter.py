@@ -12,6 +12,7 @@ from multidrop.tui.key_table import footer
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.drive import trouble_of
 from multidrop.tui.panels.drives import narrow_rows
+from multidrop.tui.panels.now import now_row
 from multidrop.tui.panels.table import column_rows
 from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.purpose import Purpose
@@ -19,7 +20,7 @@ from multidrop.tui.readout import ReadoutState
 from multidrop.tui.screen_model import BusFacts, Record, ScreenModel, bus_old, bus_state
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Page
-from multidrop.tui.widgets.bars import TRYING, Tab, banner_row, footer_row, top_row
+from multidrop.tui.widgets.bars import TRYING, Tab, banner_row, footer_row, rule_row, top_row
 from multidrop.tui.widgets.lines import Row
 
 FLOOD = 3
@@ -85,9 +86,9 @@ class Presenter:
         if not panels:
             return
         view = self.view(now)
-        self._paint_frame(main, now)
+        self._paint_frame(main, view)
         if page is not None:
-            self._paint_frame(page, now)
+            self._paint_frame(page, view)
             _show_page(page, view)
             return
         main.set_label(self.boundary.do("the label", self.purpose.label, lambda _: ((" ▸ ", "error"),)))
@@ -135,8 +136,11 @@ class Presenter:
             return ""
         return f"{bus.lost}{TRYING}" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
-    def _paint_frame(self, screen: Framed, now: float) -> None:
-        top, footer_ = partial(self._top_row, screen, now), partial(self._footer_row, screen)
+    def _paint_frame(self, screen: Framed, view: View) -> None:
+        top, footer_ = partial(self._top_row, screen, view.now), partial(self._footer_row, screen)
+        width = screen.size.width
+        row = self.boundary.do("the line below the tabs", partial(now_row, view, width), _trouble_row)
+        screen.lines("now").put([row or rule_row(width, screen.junctions, "┬")])
         screen.lines("top").put([self.boundary.do("the top line", top, _trouble_row)])
         screen.lines("footer").put([self.boundary.do("the footer", footer_, _trouble_row)])
 

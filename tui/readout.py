@@ -34,10 +34,10 @@ class ReadoutState(Enum):
     """The state of a drive or a bus: a sign, a word, a role."""
 
     UNKNOWN = ("·", "open", "dim")
-    IDLE = ("■", "idle", "text")
-    STOPPED = ("■", "stopped", "text")
+    AT_REST = ("■", "at rest", "text")
+    """Of a line: every drive of it was read at rest, and no program runs."""
     NO_CURRENT = ("□", "no current", "strong")
-    """At rest, and nothing holds the load: it is disabled, or its current is off at rest."""
+    """At rest without current to hold the load: disabled, or switched off. Of a line: one of its drives."""
     DWELL = ("▷", "dwell", "motion")
     """At rest in a program, which can move the drive at any time. Of a line: a program runs in one of its drives."""
     MOVING = ("▶", "moving", "motion")
@@ -46,8 +46,6 @@ class ReadoutState(Enum):
     LOST = ("✗", "lost", "error")
     TROUBLE = ("✗", "error", "error")
     """Of a line: a drive of it has an error or a limit."""
-    OFF = ("□", "off", "strong")
-    """Of a line: all its drives are at rest, and one has no current."""
     DIFFERS = ("≠", "twin", "error")
     """Of a line: a drive of it differs from its twin."""
 
@@ -55,7 +53,7 @@ class ReadoutState(Enum):
         self.sign, self.word, self.role = sign, word, role
 
 
-READ = (ReadoutState.MOVING, ReadoutState.STOPPED, ReadoutState.DWELL, ReadoutState.NO_CURRENT)
+READ = (ReadoutState.MOVING, ReadoutState.AT_REST, ReadoutState.DWELL, ReadoutState.NO_CURRENT)
 """The states that were read of a drive, which can be outdated."""
 
 
@@ -321,7 +319,7 @@ class Readout:
             return ReadoutState.MOVING
         if self.program.runs and not (self.conditions is not None and self.conditions.disabled):
             return ReadoutState.DWELL
-        return ReadoutState.NO_CURRENT if self.no_current else ReadoutState.STOPPED
+        return ReadoutState.NO_CURRENT if self.no_current else ReadoutState.AT_REST
 
     @property
     def _moves(self) -> bool:

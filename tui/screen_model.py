@@ -16,7 +16,18 @@ from typing import NamedTuple
 
 from multidrop.dialects import Priority, Request
 from multidrop.dialects.values import UNREAD, Conditions
-from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
+from multidrop.drives.events import (
+    BusEvent,
+    Conditioned,
+    Ended,
+    Rested,
+    Sample,
+    Sent,
+    Silent,
+    Traffic,
+    Unsolicited,
+    Valued,
+)
 from multidrop.shell import events
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.tui.curves.chart import ChartView
@@ -207,6 +218,26 @@ class Record(NamedTuple):
     """A remark of this screen to its person, which is shown nowhere else."""
     name: str = ""
     """The name that a person gave to the drive, which is shown in place of its address."""
+    details: tuple[str, ...] = ()
+    """Lines that are shown while the record is picked; its text then takes one row, cut if it is longer."""
+    joins: int = 0
+    """Not 0: it replaces an earlier record with this number that is still among the last ones."""
+
+
+class StopSummary:
+    """The drives of one stop that were read at rest so far, as one record."""
+
+    def __init__(self, stop: int) -> None:
+        self.stop, self.joins = stop, stop + 1
+        self._places: dict[str, str] = {}
+        """The positions of each drive, by its name."""
+
+    def take(self, at: float, bus: str, rested: Rested, places: str) -> Record:
+        """Add a drive; return the record of all drives so far."""
+        self._places[rested.name] = places
+        drives = [f"{name} {where}" for name, where in self._places.items()]
+        head = f"{bus}: {len(drives)} of {rested.drives} at rest"
+        return Record(at, "", "■", "   ".join((head, *drives)), details=tuple(drives), joins=self.joins)
 
 
 @dataclass
@@ -217,6 +248,8 @@ class BusFacts:
     """Records that no transcript has taken yet."""
     readouts: dict[str, Readout] = field(default_factory=dict)
     traffic: TrafficStore = field(default_factory=TrafficStore)
+    stop: StopSummary | None = None
+    """The last stop of several drives that was confirmed for one of them."""
 
     def readout(self, address: str) -> Readout:
         return self.readouts.setdefault(address, Readout())
@@ -274,7 +307,10 @@ class ScreenModel:
             case events.Notified():
                 if event.warning:
                     self.trouble = event.text
-                self.page(event.bus).append(Record(event.at, "", "!" if event.warning else ".", event.text))
+                if event.rested is not None and event.rested.drives > 1:
+                    self._rested(event, event.rested)
+                else:
+                    self.page(event.bus).append(Record(event.at, "", "!" if event.warning else ".", event.text))
             case events.Failed():
                 self.trouble = event.text
                 if event.bus and event.address:
@@ -322,6 +358,20 @@ class ScreenModel:
     def page(self, name: str) -> deque[Record]:
         """The place for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
+
+    def _rested(self, event: events.Notified, rested: Rested) -> None:
+        """Put a drive that came to rest into the one record of its stop."""
+        facts = self.bus(event.bus)
+        if facts.stop is None or facts.stop.stop != rested.stop:
+            facts.stop = StopSummary(rested.stop)
+        places = (
+            f"{axis} {self.figures(event.bus, event.address, axis).place(position)}".strip()
+            for axis, position in rested.places
+        )
+        record = facts.stop.take(event.at, event.bus, rested, ", ".join(places))
+        if facts.fresh and facts.fresh[-1].joins == facts.stop.joins:
+            facts.fresh.pop()
+        facts.fresh.append(record)
 
     def _of_drive(self, bus: str, record: Record) -> None:
         """Append a record of a drive under the name that it has in messages, which need not repeat it."""
@@ -376,7 +426,7 @@ class ScreenModel:
 
 
 def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> ReadoutState:
-    """The state of a whole bus as last read: idle only if every drive was read as stopped, and runs no program.
+    """The state of a whole bus as last read: at rest only if every drive was read at rest and runs no program.
 
     What was read before a stop counts for none that is at rest: the banner says that it is not read yet.
     """
@@ -399,7 +449,7 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> Reado
         readout.program.ran or readout.stopped_since for readout in readouts
     ):
         return ReadoutState.UNKNOWN
-    return ReadoutState.OFF if ReadoutState.NO_CURRENT in states else ReadoutState.IDLE
+    return ReadoutState.NO_CURRENT if ReadoutState.NO_CURRENT in states else ReadoutState.AT_REST
 
 
 def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:

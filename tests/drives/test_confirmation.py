@@ -9,14 +9,14 @@ import pytest
 from multidrop.base.errors import NoAnswer, Stopped, TransportLost
 from multidrop.dialects import Motion, Started
 from multidrop.drives import stopping
-from multidrop.drives.events import Sample
+from multidrop.drives.events import Rested, Sample
 from multidrop.drives.halts import Halt
 from multidrop.drives.readings import MotionReading, ProgramReading
 from multidrop.drives.stop_readings import ENDLESS, NOTHING, Activity, read_activity
 from multidrop.drives.stopping import LONGEST_SLOWING, READING_PAUSE, Stopping
 
 pytestmark = pytest.mark.virtual
-RESTS = Activity(0, False, "7")
+RESTS = Activity(0, False, (("x", 7),))
 
 
 class Link:
@@ -28,13 +28,15 @@ class Link:
 
     def __init__(self) -> None:
         self.told: list[tuple[str, bool]] = []
+        self.rested: list[Rested] = []
         self.events: list[Any] = []
 
     def now(self) -> float:
         return asyncio.get_running_loop().time()
 
-    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
+    def notify(self, text: str, address: str = "", warning: bool = False, rested: Rested | None = None) -> None:
         self.told.append((text, warning))
+        self.rested += filter(None, (rested,))
 
     def publish(self, event: Any) -> None:
         self.events.append(event)
@@ -116,9 +118,10 @@ async def confirmed(*drives: Drive, link: Link, **more: Any) -> tuple[Confirmed,
 
 async def test_a_drive_that_is_read_at_rest_twice_is_reported_once_with_its_place():
     link = Link()
-    a, b = Drive(link, "a", RESTS), Drive(link, "b", Activity(0, False, "1, 2"))
+    a, b = Drive(link, "a", RESTS), Drive(link, "b", Activity(0, False, (("x", 1), ("y", 2))))
     made, halt = await confirmed(a, b, link=link)
     assert link.told == [("a: stopped, velocity 0 at 7", False), ("b: stopped, velocity 0 at 1, 2", False)]
+    assert link.rested == [Rested(1, 2, "a", (("x", 7),)), Rested(1, 2, "b", (("x", 1), ("y", 2)))]
     assert [len(each.times) for each in (a, b)] == [2, 2] and a.times[1] - a.times[0] == pytest.approx(READING_PAUSE)
     assert made.unconfirmed == [] and made.again == [] and not halt.vain and made.tasks == []
 
@@ -152,7 +155,7 @@ async def test_a_drive_that_does_not_slow_down_is_stopped_again_and_said_to_move
     ("found", "does", "end"),
     [
         (Activity(300), "still moves at 300 a second", "STILL MOVING"),
-        (Activity(0, True, "7"), "its program still runs", "STILL RUNNING"),
+        (Activity(0, True, (("x", 7),)), "its program still runs", "STILL RUNNING"),
         (Activity(300, True), "still moves at 300 a second", "STILL MOVING"),
     ],
 )
@@ -267,7 +270,7 @@ async def of_one_axis(drive: Drive, link: Link) -> tuple[Confirmed, Halt]:
 
 async def test_a_stop_of_one_axis_asks_for_that_axis_and_counts_its_rests():
     link = Link()
-    a = spared(link, Activity(300), Activity(0, True, "7"))
+    a = spared(link, Activity(300), Activity(0, True, (("x", 7),)))
     made, halt = await of_one_axis(a, link)
     assert a.asked == frozenset("x") and list(halt.rests.values()) == [2]  # type: ignore[attr-defined]
     assert len(a.times) == 3 and made.again == [] and link.told == [("a X: stopped, velocity 0 at 7", False)]
@@ -316,11 +319,11 @@ UNREAD = "velocity 0 was read, and whether a program runs was not: no reply"
 @pytest.mark.parametrize(
     ("found", "runs", "axes", "activity", "why", "asked"),
     [
-        ((X,), False, None, Activity(0, False, "7"), "", 1),
-        ((X,), True, None, Activity(0, True, "7"), "", 1),
-        ((X, Y), True, None, Activity(300, False, "7, 8"), "", 0),
-        ((X, Y), True, frozenset("x"), Activity(0, False, "7"), "", 0),
-        ((YRUNS, X), False, None, Activity(0, True, "8, 7"), "", 0),
+        ((X,), False, None, Activity(0, False, (("x", 7),)), "", 1),
+        ((X,), True, None, Activity(0, True, (("x", 7),)), "", 1),
+        ((X, Y), True, None, Activity(300, False, (("x", 7), ("y", 8))), "", 0),
+        ((X, Y), True, frozenset("x"), Activity(0, False, (("x", 7),)), "", 0),
+        ((YRUNS, X), False, None, Activity(0, True, (("y", 8), ("x", 7))), "", 0),
         ((X,), NoAnswer("no reply"), None, Activity(), UNREAD, 1),
         ((X,), TimeoutError("no reply"), None, Activity(), UNREAD, 1),
         ((X,), TransportLost("no reply"), None, Activity(), UNREAD, 1),

@@ -53,7 +53,8 @@ def test_a_drive_is_shown_on_a_terminal_and_not_obeyed(hostile_url, tmp_path, do
             with contextlib.suppress(pexpect.TIMEOUT):
                 terminal.feed(child.read_nonblocking(65536, 0.1))
 
-    read_until(lambda: "idle" in screen.display[0] if door == "tui" else any("LMDCM" in row for row in screen.display))
+    words, rows = ("at rest", 1) if door == "tui" else ("LMDCM", 24)
+    read_until(lambda: any(words in row for row in screen.display[:rows]))
     child.send(f"/log {log}\r/drives\r/status\r")
     read_until(lambda: log.exists() and "at rest: P=51200" in log.read_text())
     child.send("/quit\r")

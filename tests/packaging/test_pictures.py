@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
-STATE = re.compile(r"\d|moving|idle|stopped")
+STATE = re.compile(r"\d|moving|at rest")
 
 
 @pytest.fixture(scope="module")

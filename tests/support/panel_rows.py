@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from multidrop.shell.events import SessionEvent
+from multidrop.tui.app import bindings
+from multidrop.tui.keymap import Keymap, keymap
 from multidrop.tui.panels.view import View, figures_at, glances_of
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.lines import Row
@@ -13,6 +15,11 @@ from tests.support.fake_session import FakeSession
 
 def plain(*rows: Row) -> str:
     return "\n".join("".join(text for text, _ in row) for row in rows)
+
+
+def own_keys() -> Keymap:
+    """The keys of the screen, none of which a person has changed."""
+    return keymap(bindings(), {})
 
 
 def view(session: FakeSession, *events: SessionEvent, polling: bool = True) -> View:

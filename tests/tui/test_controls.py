@@ -34,7 +34,7 @@ def at_rest(at: float) -> Readout:
 
 
 def allows(
-    jog: Jog, readout: Readout, now: float, *, idle: bool = True, state: ReadoutState = ReadoutState.STOPPED
+    jog: Jog, readout: Readout, now: float, *, idle: bool = True, state: ReadoutState = ReadoutState.AT_REST
 ) -> bool:
     return jog.allows(readout, readout, state, now, idle=idle)
 
@@ -66,7 +66,7 @@ def test_a_held_key_moves_once_however_short_the_move_is() -> None:
         (ReadoutState.LOST, True, "it is lost"),
         (ReadoutState.UNKNOWN, True, "it is not read yet"),
         (ReadoutState.STORING, True, "it is storing"),
-        (ReadoutState.STOPPED, False, "a line is on its way"),
+        (ReadoutState.AT_REST, False, "a line is on its way"),
     ],
 )
 def test_a_press_is_dropped_unless_the_drive_is_known_to_rest(state: ReadoutState, idle: bool, why: str) -> None:
@@ -85,9 +85,9 @@ def test_of_a_lost_drive_nobody_says_that_it_moves() -> None:
 def test_an_axis_with_an_error_that_must_be_cleared_is_not_ready() -> None:
     readout = at_rest(10.0)
     readout.condition(10.0, [Conditions(error=128, error_text="plus limit error", clears="CLRX")])
-    assert Jog().obstacle(readout, readout, ReadoutState.STOPPED, 10.1) == "plus limit error: CLRX clears it"
+    assert Jog().obstacle(readout, readout, ReadoutState.AT_REST, 10.1) == "plus limit error: CLRX clears it"
     readout.condition(10.0, [Conditions(error=86, error_text="stall")])
-    assert Jog().obstacle(readout, readout, ReadoutState.STOPPED, 10.1) == ""
+    assert Jog().obstacle(readout, readout, ReadoutState.AT_REST, 10.1) == ""
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 0.6), st.booleans()), max_size=40))
@@ -220,11 +220,11 @@ async def test_a_disabled_axis_has_its_own_state_and_takes_no_move() -> None:
     async with on_screen() as (pilot, app, session):
         for address in "abc":
             await emit(pilot, OnBus("press", Sample(session.time - 0.05, address, 1000, 0)))
-        assert "1 press ■ idle" in app.main.lines("top").plain
+        assert "1 press ■ at rest" in app.main.lines("top").plain
         await emit(pilot, OnBus("press", Conditioned(session.time, "a", (Conditions(disabled="DE=0"),))))
-        assert "1 press □ off" in app.main.lines("top").plain
+        assert "1 press □ no current" in app.main.lines("top").plain
         status = app.main.lines("status").plain
-        assert "a gantry □ no current" in status and "b clamp  ■ stopped" in status
+        assert "a gantry □ no current" in status and "b clamp  ■ at rest" in status
         await press(pilot, "ctrl+n")
         await press(pilot, "right")
         page = app.screen

@@ -64,7 +64,7 @@ async def test_rows_of_drives_are_clicked_on_the_main_screen_and_on_the_page() -
         async with on_screen(width=size[0], height=size[1]) as (pilot, app, session):
             session.emit(*(OnBus("press", Sample(session.time, each, 5, 0)) for each in "abc"))
             await settle(pilot)
-            part = app.main.lines("status" if size[0] == 80 else "side")
+            part = app.main.lines("status" if size[0] == 80 else "panel")
             row = next(n for n, each in enumerate(part.plain.split("\n")) if each.lstrip("│ ").startswith("b clamp"))
             await pilot.click(part, offset=(10, row))
             await settle(pilot)

@@ -7,10 +7,12 @@ from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import By, Entered, OnBus, Printed
 from multidrop.shell.roles import Series
 from multidrop.tui.app import MultidropApp
+from multidrop.tui.panels.drive_columns import ALL_DRIVES
+from multidrop.tui.panels.machine import DriveOnLine
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.polling import CONDITIONS, CONDITIONS_OF_OTHERS
 from multidrop.tui.readout import Readout
-from multidrop.tui.screens.all_drives import AllDrives, DriveOnLine, drive_row
+from multidrop.tui.screens.all_drives import AllDrives
 from multidrop.tui.screens.page import ListPage, Page
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import (
@@ -28,6 +30,7 @@ from tests.support.fake_session import (
     settle,
     toasts,
 )
+from tests.support.panel_rows import view
 
 pytestmark = pytest.mark.tui
 SPLIT = ("ctrl+p", *"split the", "enter")
@@ -105,7 +108,7 @@ async def test_a_drive_with_an_error_is_counted_as_that() -> None:
         session.emit(*(OnBus("press", Sample(session.time, each, 500, 7 * (each == "b"))) for each in "abc"))
         session.emit(with_error(session, "c"), with_error(session, "b"))
         await press(pilot, "ctrl+a")
-        assert "2 error · 1 moving · 1 stopped" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
+        assert "2 error · 1 moving · 1 at rest" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
 
 
 PAGES = ["", "plot", "drives", "controls", "program", "parameters", "why", "traffic", "macros"]
@@ -182,7 +185,8 @@ async def test_what_is_typed_on_the_page_of_all_drives_chooses_an_address_and_en
 def test_a_row_fits_and_shows_the_trouble_at_every_width(width: int) -> None:
     readout = Readout()
     readout.take(Sample(1.0, "a", -2_147_483_648, 5_000_000, "", "limit+"))
-    row = drive_row(DriveOnLine("gantry-left", Glance("a", "a-long-name", "LMDCM", "", readout)), 1.0, width, True)
+    place = DriveOnLine("gantry-left", Glance("a", "a-long-name", "LMDCM", "", readout))
+    row = ALL_DRIVES.row(place, view(demo_session()), width, True)
     assert width_of(row) == width
     assert "✗ limi" in "".join(text for text, _ in row)
 

@@ -48,7 +48,7 @@ def test_stopped_is_said_only_when_the_velocity_was_read_as_0(model: ScreenModel
     model.take(Notified(1.1, "stop: stop sent to every drive", "press"))
     assert readout(model).state() is ReadoutState.MOVING
     model.take(sample(1.2, 0))
-    assert readout(model).state() is ReadoutState.STOPPED
+    assert readout(model).state() is ReadoutState.AT_REST
 
 
 def test_progress_is_shown_until_its_end(model: ScreenModel) -> None:
@@ -67,7 +67,7 @@ def test_an_old_state_stays_with_its_age_until_the_next_is_read(model: ScreenMod
         model.bus("press"), ["a"], 4.0
     )
     model.take(sample(4.1, 0))
-    assert readout(model).words(4.2) == "stopped"
+    assert readout(model).words(4.2) == "at rest"
     assert readout(model).words(14.0) == "at rest 10 s ago"
     assert not bus_old(model.bus("press"), ["a"], 4.2)
 
@@ -88,7 +88,7 @@ def test_a_drive_that_does_not_answer_is_silent_and_not_its_last_state(model: Sc
     assert readout(model).state() is ReadoutState.SILENT
     assert readout(model).words(4.0) == "silent 3 s"
     model.take(sample(4.0, 0))
-    assert readout(model).state() is ReadoutState.STOPPED
+    assert readout(model).state() is ReadoutState.AT_REST
 
 
 def test_a_drive_in_program_mode_is_said_to_store(model: ScreenModel) -> None:
@@ -101,7 +101,7 @@ def test_what_was_read_before_a_line_was_sent_is_old(model: ScreenModel) -> None
         readout(model, address).period = 2.0
         model.take(sample(1.0, 0, address=address))
     model.take(Entered(2.0, "@b MR 5", By.OPERATOR, "press", "b"))
-    assert readout(model, "a").words(2.1) == "stopped"
+    assert readout(model, "a").words(2.1) == "at rest"
     assert readout(model, "b").words(2.1) == "at rest 1 s ago"
     model.take(sample(2.2, 700, address="b"))
     assert readout(model, "b").words(2.3) == "moving"
@@ -113,7 +113,7 @@ def test_a_value_that_is_read_anew_ten_times_a_second_does_not_flicker_with_ever
     readout(model).period = 0.1
     model.take(sample(1.0, 0))
     model.take(Entered(1.05, "PR P", By.OPERATOR, "press", "a"))
-    assert readout(model).words(1.1) == "stopped"
+    assert readout(model).words(1.1) == "at rest"
 
 
 def test_the_rate_is_counted_and_not_promised(model: ScreenModel) -> None:
@@ -163,7 +163,7 @@ def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
     facts.readout("a").take(Sample(1.0, "a", 0, 0))
     assert bus_state(facts, ["a", "b"], False) is ReadoutState.UNKNOWN
     facts.readout("b").take(Sample(1.0, "b", 0, 0))
-    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.AT_REST
     facts.readout("b").take(Sample(1.1, "b", 0, 7))
     assert bus_state(facts, ["a", "b"], False) is ReadoutState.MOVING
     assert bus_state(facts, ["a", "b"], True) is ReadoutState.LOST
@@ -185,19 +185,19 @@ def test_a_line_is_not_idle_while_a_program_runs_in_a_drive_of_it() -> None:
     facts.readout("b").condition(10.0, [Conditions(disabled="DE=0", runs=True, program="running")])
     assert bus_state(facts, both, False) is ReadoutState.DWELL
     facts.readout("b").condition(10.0, [Conditions(runs=False)])
-    assert bus_state(facts, both, False) is ReadoutState.IDLE
+    assert bus_state(facts, both, False) is ReadoutState.AT_REST
 
 
 def test_a_line_is_not_idle_after_a_stop_before_each_drive_was_read(model: ScreenModel) -> None:
     for address in "ab":
         model.take(OnBus("press", Sample(1.0, address, 5, 0)))
     facts = model.bus("press")
-    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.AT_REST
     model.stopped(2.0)
     model.take(OnBus("press", Sample(2.1, "a", 5, 0)))
     assert bus_state(facts, ["a", "b"], False) is ReadoutState.UNKNOWN
     model.take(OnBus("press", Sample(2.2, "b", 5, 0)))
-    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.AT_REST
 
 
 def test_what_was_read_of_a_program_before_a_stop_is_past_until_the_stop_has_read_it(model: ScreenModel) -> None:
@@ -208,13 +208,13 @@ def test_what_was_read_of_a_program_before_a_stop_is_past_until_the_stop_has_rea
     a, b = facts.readout("a"), facts.readout("b")
     assert (a.state(), program_words(a, 2.0)) == (ReadoutState.DWELL, "program running")
     model.stopped(2.0)
-    assert (a.state(), program_words(a, 4.0), a.aged(4.0)) == (ReadoutState.STOPPED, "program ran 3 s ago", True)
+    assert (a.state(), program_words(a, 4.0), a.aged(4.0)) == (ReadoutState.AT_REST, "program ran 3 s ago", True)
     assert bus_state(facts, ["a", "b"], False) is ReadoutState.UNKNOWN
     stopped = Sample(3.0, "a", 5, 0, program=False)
     assert not model.quiet(OnBus("press", stopped))
     model.take(OnBus("press", stopped))
     model.take(OnBus("press", Sample(3.0, "b", 5, 0, program=True)))
-    assert (a.state(), program_words(a, 4.0)) == (ReadoutState.STOPPED, "")
+    assert (a.state(), program_words(a, 4.0)) == (ReadoutState.AT_REST, "")
     assert (b.state(), program_words(b, 4.0)) == (ReadoutState.DWELL, "program running")
     assert model.quiet(OnBus("press", stopped._replace(at=4.0, program=None)))
     assert not model.quiet(OnBus("press", stopped._replace(at=4.0, program=True)))
@@ -225,7 +225,7 @@ def test_a_line_with_an_error_shows_it_unless_a_drive_moves_or_is_silent() -> No
     facts = BusFacts()
     for address in ("a", "b"):
         facts.readout(address).take(Sample(1.0, address, 5, 0))
-    assert bus_state(facts, ["a", "b"], False) is ReadoutState.IDLE
+    assert bus_state(facts, ["a", "b"], False) is ReadoutState.AT_REST
     facts.readout("b").condition(1.0, [Conditions(error=84)])
     assert bus_state(facts, ["a", "b"], False) is ReadoutState.TROUBLE
     facts.readout("a").take(Sample(2.0, "a", 9, 100))

@@ -28,7 +28,7 @@ NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 @asynccontextmanager
 async def press(tmp_path: Path, size: tuple[int, int] = (80, 24), reconnect: bool = False) -> AsyncIterator[Pilot[int]]:
     async with real_screen(tmp_path, size=size, reconnect=reconnect) as pilot:
-        await until(pilot, lambda: "■ stopped" in status(pilot))
+        await until(pilot, lambda: "■ at rest" in status(pilot))
         yield pilot
 
 
@@ -63,7 +63,7 @@ async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "MR 102400", "enter")
         await until(pilot, lambda: "▶ moving" in status(pilot))
-        await until(pilot, lambda: re.search(r"▸a +■ stopped .* 10\.00000 mm", status(pilot)) is not None)
+        await until(pilot, lambda: re.search(r"▸a +■ at rest .* 10\.000 mm", status(pilot)) is not None)
         typed(pilot, "PR P", "enter")
         await until(pilot, lambda: "  102400" in transcript(pilot))
 
@@ -83,7 +83,7 @@ async def test_ctrl_x_stops_a_drive_that_nobody_selected(tmp_path: Path) -> None
         typed(pilot, "@b SL 50000", "enter")
         await until(pilot, lambda: " b        ▶ moving" in status(pilot))
         typed(pilot, "ctrl+x")
-        await until(pilot, lambda: " b        ■ stopped" in status(pilot))
+        await until(pilot, lambda: " b        ■ at rest" in status(pilot))
         assert app_of(pilot).main.query_one(".banner").display
         typed(pilot, "/resume", "enter")
         await until(pilot, lambda: not app_of(pilot).main.query_one(".banner").display)
@@ -103,14 +103,14 @@ async def test_a_macro_is_recorded_put_on_a_key_and_played(tmp_path: Path) -> No
         typed(pilot, "ctrl+p", "record", "enter", "nudge", "enter")
         await until(pilot, lambda: app_of(pilot).session.recording == "nudge")
         typed(pilot, "MR 1000", "enter")
-        await until(pilot, lambda: " 0.09766 mm" in status(pilot))
+        await until(pilot, lambda: " 0.098 mm" in status(pilot))
         typed(pilot, "/record stop", "enter")
         await until(pilot, lambda: not app_of(pilot).session.recording)
         typed(pilot, "/key F4 nudge", "enter")
         await until(pilot, lambda: "F4 nudge" in app_of(pilot).main.lines("footer").plain)
         typed(pilot, "f4")
         await until(pilot, lambda: "» @a MR 1000" in transcript(pilot))
-        await until(pilot, lambda: " 0.19531 mm" in status(pilot))
+        await until(pilot, lambda: " 0.195 mm" in status(pilot))
 
 
 async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
@@ -127,22 +127,22 @@ async def test_a_lost_bus_comes_back_in_its_tab(tmp_path: Path) -> None:
         await until(pilot, lambda: "LOST - " in app_of(pilot).main.query_one(".banner").plain)  # type: ignore[attr-defined]
         assert app_of(pilot).main.query_one(".banner").plain.rstrip().endswith("; trying again")  # type: ignore[attr-defined]
         typed(pilot, "/sim plug press", "enter")
-        await until(pilot, lambda: "■ stopped" in status(pilot) and "press is back after" in transcript(pilot))
+        await until(pilot, lambda: "■ at rest" in status(pilot) and "press is back after" in transcript(pilot))
         assert not app_of(pilot).main.query_one(".banner").display
         typed(pilot, "MR 1000", "enter")
-        await until(pilot, lambda: " 0.09766 mm" in status(pilot))
+        await until(pilot, lambda: " 0.098 mm" in status(pilot))
 
 
 async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:
     async with real_screen(tmp_path, "sim:#pmx", (120, 40)) as pilot:
-        await until(pilot, lambda: "■ stopped" in status(pilot))
+        await until(pilot, lambda: "■ at rest" in status(pilot))
         typed(pilot, "X300Y-200", "enter")
         await until(pilot, lambda: "   300 pulses" in status(pilot))
-        await until(pilot, lambda: "  -200 pulses" in status(pilot) and "■ stopped" in status(pilot))
+        await until(pilot, lambda: "  -200 pulses" in status(pilot) and "■ at rest" in status(pilot))
         typed(pilot, "JY+", "enter")
         await until(pilot, lambda: "▶ moving" in status(pilot))
         typed(pilot, "ctrl+x")
-        await until(pilot, lambda: "■ stopped" in status(pilot))
+        await until(pilot, lambda: "■ at rest" in status(pilot))
 
 
 async def test_raw_mode_shows_the_bytes_and_names_the_bus(tmp_path: Path) -> None:

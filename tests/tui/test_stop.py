@@ -121,7 +121,7 @@ async def test_it_stops_when_the_terminal_is_too_small() -> None:
 async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_unread() -> None:
     async with on_screen() as (pilot, app, session):
         await emit(pilot, *a_move(session))
-        assert "b clamp  ■ stopped" in app.main.lines("status").plain
+        assert "b clamp  ■ at rest" in app.main.lines("status").plain
         await press(pilot, "ctrl+x")
         assert "b clamp  ■ 0.9 s ago" in app.main.lines("status").plain
         assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
@@ -178,7 +178,7 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
             assert (
                 state in (ReadoutState.MOVING, ReadoutState.DWELL)
                 if runs
-                else state is not ReadoutState.IDLE or tally.stand
+                else state is not ReadoutState.AT_REST or tally.stand
             )
 
         session.subscribe(agree)
@@ -188,7 +188,7 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
         session.stop()
         model.stopped(session.now())
         await asyncio.sleep(5.0)
-        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is ReadoutState.IDLE
+        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is ReadoutState.AT_REST
         for each in polls:
             each.close()
 

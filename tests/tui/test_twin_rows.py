@@ -13,13 +13,15 @@ from multidrop.shell.events import Agreed, By, OnBus, Predicted, SessionEvent, T
 from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.tui.curves.raster import ASCII, BLOCK, BRAILLE, TWINS, Ink
 from multidrop.tui.panels.drive import drive_rows
-from multidrop.tui.panels.drives import drives_rows, kept, narrow_rows
+from multidrop.tui.panels.drive_columns import ALL_DRIVES
+from multidrop.tui.panels.drive_table import drives_rows
+from multidrop.tui.panels.drives import kept, narrow_rows
+from multidrop.tui.panels.machine import summary, worst_first
 from multidrop.tui.panels.plot import plot_rows, plot_title
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import trouble_mark
 from multidrop.tui.readout import ReadoutState
 from multidrop.tui.screen_model import bus_state
-from multidrop.tui.screens.all_drives import drive_row, summary, worst_first
 from multidrop.tui.widgets.lines import Row, width_of
 from multidrop.tui.widgets.theme import Signs, shown_as
 from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, emit, make_app, on_screen, press
@@ -115,7 +117,7 @@ def test_a_drive_that_differs_comes_first_of_all_drives(width: int, session: Fak
     places = worst_first(shown, "≠")
     assert [place.glance.address for place in places] == ["b"]
     assert next(place for place in worst_first(shown, "") if place.bus == "press").glance.address == "b"
-    row = drive_row(places[0], shown.now, width, False)
+    row = ALL_DRIVES.row(places[0], shown, width, False)
     assert "≠ -8112" in plain(row) and width_of(row) <= width
     assert kept(shown.glances, 1)[0].address == "a" and kept(shown.glances, 2)[1].address == "b"
 
@@ -127,7 +129,7 @@ def test_trouble_and_a_difference_are_both_said(session: FakeSession) -> None:
     assert plain(drives_rows(shown, 45, 3)[0]).endswith(" ✗ error ≠ -8112")
     assert plain(drives_rows(shown, 39, 3)[0]).endswith(" ✗ error ≠")
     places = worst_first(shown, "press")
-    assert plain(drive_row(places[0], shown.now, 120, False)).endswith(" ✗ error ≠ -8112")
+    assert plain(ALL_DRIVES.row(places[0], shown, 120, False)).endswith(" ✗ error ≠ -8112")
     assert summary(places).startswith("1 error · 1 ≠ twin · ")
 
 
@@ -232,7 +234,7 @@ async def test_the_palette_begins_and_ends_the_twins_of_the_line_as_typed_lines_
         await pilot.pause()
         session.predicted.add(session.buses["press"])
         await emit(pilot, *beside(session.time, 0, 0, 8112), isolated(session))
-        assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
+        assert "≠" in app.main.lines("side").plain
         assert "≠ twin" in app.main.lines("top").plain
         assert "Twin off" in {each.title for each in app.act.commands()}
         await app.run_action("act.switch('twin')")

@@ -34,7 +34,7 @@ def shows(child, true) -> None:
 def stuck(shop):
     """A screen that shows a flood on an unread terminal, while a drive moves."""
     child = shop.terminal("tui", "noisy", "press")
-    shows(child, lambda screen: sum(line.count("idle") for line in screen) == 2)
+    shows(child, lambda screen: screen[0].count("at rest") == 2)
     child.send(F3)
     until(lambda: shop.has_seen(FLOOD), "it takes no more from the drive")
     until(lambda: shop.velocity() == 100000, "it does not move")

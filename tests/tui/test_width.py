@@ -11,7 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from textual.geometry import Region
 from textual.pilot import Pilot
 
 from multidrop.dialects.values import Conditions
@@ -21,17 +20,16 @@ from multidrop.shell.events import By, Entered, Failed, OnBus, ProgramRead
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
-from multidrop.tui.panels.facts import cards_rows, next_rows, selected_rows
+from multidrop.tui.panels.facts import next_rows, selected_rows
 from multidrop.tui.panels.table import panel
 from tests.support.fake_session import demo_session, emit, make_app, on_screen, painted, press, settle
-from tests.support.panel_rows import plain, view
+from tests.support.panel_rows import own_keys, plain, view
 
 pytestmark = pytest.mark.tui
 
-ENOUGH = 0.7
-"""The least share of the rows between head and foot that carry something in a half of the width."""
-MOVES = ("@b SL 20000", "@c SL -50000", "SL 100000")
-BORDERS = "│├┤┼─┬┴ "
+MOST_WORDS = 220
+"""The words on the screen at rest; a word is what is left after splitting at spaces."""
+UNKNOWN = ("not read", "none seen", "nothing yet", "not known", "no error")
 
 
 @contextlib.asynccontextmanager
@@ -52,40 +50,15 @@ async def the_demo(size: tuple[int, int]) -> AsyncIterator[tuple[Pilot[int], Mul
             await session.close()
 
 
-def carried(app: MultidropApp) -> list[float]:
-    """The share of the rows that carry something, of each half; the unfilled end of the transcript is not counted."""
-    rows = ["".join(segment.text for segment in strip) for strip in painted(app.main)]
-    body, transcript = app.main.query_one("#body").region, app.main.transcript
-    unfilled = Region.from_corners(
-        transcript.region.x, transcript.region.y + len(transcript.plain.split("\n")), *transcript.region.bottom_right
-    )
-    found = []
-    for left, right in ((0, app.size.width // 2), (app.size.width // 2, app.size.width)):
-        counted = [
-            y for y in range(body.y, body.bottom) if not (unfilled.contains(left, y) and unfilled.right >= right)
-        ]
-        found.append(sum(bool(rows[y][left:right].strip(BORDERS)) for y in counted) / len(counted))
-    return found
-
-
-@pytest.mark.parametrize("moves", [(), MOVES], ids=["at rest", "three move"])
-@pytest.mark.parametrize("size", [(120, 40), (200, 50)])
-async def test_most_rows_carry_something_in_each_half_of_the_width(
-    size: tuple[int, int], moves: tuple[str, ...]
-) -> None:
-    async with the_demo(size) as (pilot, app):
-        for line in moves:
-            app.main.entry.value = line
-            await pilot.press("enter")
-            await asyncio.sleep(0.3)
-        await settle(pilot)
-        assert ("plot last" in app.main.lines("panel").plain + app.main.lines("far").plain) is bool(moves)
-        left, right = carried(app)
-    assert min(left, right) >= ENOUGH, (left, right)
+async def test_the_screen_of_a_machine_at_rest_is_calm_and_says_nothing_of_what_is_not_known() -> None:
+    async with the_demo((120, 40)) as (_, app):
+        shown = "\n".join("".join(segment.text for segment in strip) for strip in painted(app.main))
+    assert len(shown.split()) <= MOST_WORDS, shown
+    assert not [words for words in UNKNOWN if words in shown], shown
 
 
 @pytest.mark.parametrize("size", [(120, 40), (200, 50)])
-async def test_places_rest_on_the_size_alone(size: tuple[int, int]) -> None:
+async def test_the_places_depend_on_the_size_alone(size: tuple[int, int]) -> None:
     """What moves, what is read and what is in trouble change the contents of a place, and never where it is."""
     session = demo_session()
     app = make_app(session)
@@ -111,66 +84,63 @@ async def test_the_plot_has_a_curve_for_each_drive_that_moves_and_goes_when_they
     async with on_screen(width=120, height=40) as (pilot, app, session):
         below = app.main.lines("panel")
         await settle(pilot)
-        assert "lines and drives" in below.plain
+        assert "drive        state" in below.plain and "plot" not in below.plain
         for bus, address in (("press", "b"), ("eth", "")):
             samples = [Sample(session.time - 2 + n / 10, address, n * 1000, 1000 + n) for n in range(20)]
             await emit(pilot, *(OnBus(bus, each) for each in samples))
-        assert "plot last 20 s" in below.plain and "lines and drives" not in below.plain
+        assert "plot last 20 s" in below.plain and "drive        state" in below.plain
         for name, last in ((name, last) for name in ("press:b", "eth") for last in (1019, 19000)):
             assert re.search(rf"{name}( clamp)? +{last} ", below.plain), "a legend by name, with the last value"
         assert session.buses["eth"].telemetry.polled[""] == 0.25  # a curve is no reason to poll faster
         session.time += 25
         await emit(pilot, OnBus("press", Sample(session.time, "b", 20_000, 0)))
-        assert "lines and drives" in below.plain
+        assert "plot" not in below.plain
 
 
-async def test_a_key_gives_the_room_of_the_plot_to_the_transcript_and_a_split_takes_it() -> None:
+async def test_hidden_panels_give_their_room_to_the_transcript_and_a_split_takes_it() -> None:
     async with on_screen(width=120, height=40) as (pilot, app, _):
         await settle(pilot)
         small = app.main.transcript.size.height
-        await press(pilot, "ctrl+g", "ctrl+g", "escape")
+        for name in ("drives", "plot"):
+            await app.run_action(f"act.panel('{name}')")
+        await settle(pilot)
         assert app.main.transcript.size.height > small + 10 and not app.main.lines("panel").display
-        await press(pilot, "ctrl+g", "ctrl+g", "escape")
+        for name in ("drives", "plot"):
+            await app.run_action(f"act.panel('{name}')")
         await app.run_action("act.split")
         await press(pilot, "down", "enter")
-        assert not app.main.lines("panel").display and "lines and drives" in app.main.lines("side").plain
+        assert not app.main.lines("panel").display and "├ drives " in app.main.lines("side").plain
 
 
-def test_a_card_says_what_a_drive_is_and_what_was_last_known_of_it() -> None:
+def test_the_panel_of_a_drive_has_what_is_known_of_it_and_nothing_else() -> None:
     session = demo_session()
-    session.units.give("b", "5 mm/turn")
+    session.units.give("a", "5 mm/turn")
     at = session.time
     shown = view(
         session,
-        Entered(at, "PR VX", By.OPERATOR, "press", "b"),
-        Failed(at, "b refused 'PR VX': error 35: this cannot be printed", "press", "b", code=35),
-        Failed(at, "b does not reply", "press", "b"),
-        Entered(at, "/list b", By.OPERATOR, "press", "b"),
-        ProgramRead(at, "press", "b", ((1, "H"), (3, "E"))),
+        Entered(at, "PR VX", By.OPERATOR, "press", "a"),
+        Failed(at, "a refused 'PR VX': error 35: this cannot be printed", "press", "a", code=35),
+        Failed(at, "a does not reply", "press", "a"),
+        Entered(at, "/list a", By.OPERATOR, "press", "a"),
+        ProgramRead(at, "press", "a", ((1, "H"), (3, "E"))),
     )
-    text = plain(*cards_rows(shown, 60, 40))
-    for words in (
-        "press sim:#press",
-        "b clamp    LMDCM 6.002",
-        "5 mm/turn",
-        "2 lines, read 12:41:07",
-        "12:41:07 error 35: this cannot be printed",
-        "12:41:07 PR VX",
-        "✗ lost: tcp://10.0.0.5:503: closed",
-    ):
+    text = plain(*selected_rows(shown, 60, 20))
+    for words in ("5 mm/turn", "2 lines, read 12:41:07", "12:41:07 error 35: this cannot be printed", "12:41:07 PR VX"):
         assert words in text, words
-    assert "a gantry" not in text  # the selected drive has a panel
-    assert "not read: /list a" in plain(*selected_rows(shown, 60, 14))
+    nothing = plain(*selected_rows(view(demo_session()), 60, 20))
+    assert not [word for word in ("program", "last", "units", "travel", "none seen") if word in nothing], nothing
 
 
-def test_what_to_press_begins_with_what_the_state_asks_for() -> None:
+def test_what_is_next_begins_with_what_the_state_asks_for() -> None:
     session = demo_session()
     session.latched, session.recording = True, "go"
-    first = [row[0][0].strip() for row in next_rows(view(session), 40, 30)][:3]
-    assert first == ["/resume", "/record stop", "/list a"]
+    keys = replace(view(session), keys=own_keys())
+    assert [row[0][0].strip() for row in next_rows(keys, 40, 30)] == ["/resume", "/record stop", "^N"]
+    calm = replace(view(demo_session()), keys=own_keys())
+    assert [row[0][0].strip() for row in next_rows(calm, 40, 30)] == ["^N", "^E", "^G"]
 
 
-def test_what_to_press_clears_the_error_of_whichever_axis_has_one_or_explains_its_number() -> None:
+def test_what_is_next_clears_the_error_of_whichever_axis_has_one_or_explains_its_number() -> None:
     session = demo_session()
     x = Conditions("x")
 
@@ -183,12 +153,11 @@ def test_what_to_press_clears_the_error_of_whichever_axis_has_one_or_explains_it
     assert asked(replace(limit, clears=""))[0] == "/help 128"
 
 
-async def test_what_to_press_has_the_macros_and_the_keys_that_a_person_set() -> None:
+async def test_what_is_next_has_the_macros_on_keys() -> None:
     async with on_screen(width=200, height=50) as (pilot, app, _):
         await settle(pilot)
         side = app.main.lines("side").plain
         assert "F2           home-all: all axes to their switches" in side and "F3           plays shuttle" in side
-        assert "^A           every drive of every line" in side and "^K           play, record" in side
 
 
 def test_a_program_that_is_not_known_gives_its_room_away() -> None:
@@ -203,4 +172,4 @@ async def test_the_page_of_all_drives_shows_the_chosen_one_in_the_room_that_the_
         await emit(pilot, *(OnBus("eth", each) for each in samples))
         await press(pilot, "ctrl+a", *"eth")
         below = app.screen.lines("chosen").plain  # type: ignore[attr-defined]
-        assert "LMDCE" in below and "velocity eth steps/s" in below and "not read: /list" in below
+        assert "LMDCE" in below and "velocity eth steps/s" in below

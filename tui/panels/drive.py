@@ -53,7 +53,7 @@ def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], li
     """The lamps of inputs, and those of outputs, each with its heading before the first one."""
     of_axes: list[list[list[Span]]] = []
     for output, head in ((False, "in "), (True, "out ")):
-        lamps = [lamp for lamp in conditions.lamps if lamp.output is output]
+        lamps = [lamp for lamp in conditions.lamps if lamp.output is output and (lamp.function or lamp.known)]
         plain = [lamp for lamp in lamps if lamp.name.isdigit() and not lamp.function]
         plain = plain if len(plain) >= MANY else []
         groups = [lamp_span(lamp, old) for lamp in lamps if lamp not in plain]
@@ -128,6 +128,7 @@ def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
 STATED, SOFTWARE, LEARNT, SEEN = "travel", "limits", "switches", "seen"
 """Where a travel comes from: the scale, software limits, limit switches that were reached, the places seen so far."""
 SHORTEST_BAR = 6
+SLOWING = "slowing down"
 STEADY = 0.01
 """Share of the velocity below which a change counts as none."""
 LOOK_BACK = 0.15
@@ -185,7 +186,7 @@ def _cell(position: int, travel: Travel, width: int) -> int:
 
 
 def phase(readout: Readout) -> str:
-    """`accelerates`, `cruises` or `slows down`; empty at rest, and where one reading is all there is."""
+    """Return `speeding up`, `cruising` or `slowing down`; empty at rest, or if there is only one reading."""
     if readout.last is None or not readout.last.velocity:
         return ""
     at = readout.last.at
@@ -194,8 +195,8 @@ def phase(readout: Readout) -> str:
         return ""
     now, then = abs(readout.last.velocity), abs(before.velocity)
     if abs(now - then) <= STEADY * max(now, then):
-        return "cruises"
-    return "accelerates" if now > then else "slows down"
+        return "cruising"
+    return "speeding up" if now > then else SLOWING
 
 
 def seconds_to_go(readout: Readout, now: float) -> float | None:
@@ -206,7 +207,7 @@ def seconds_to_go(readout: Readout, now: float) -> float | None:
     left = conditions.target - last.position
     if not last.velocity or (left > 0) != (last.velocity > 0):
         return None
-    seconds = _duration(abs(left), abs(last.velocity), conditions.pace, braking=phase(readout) == "slows down")
+    seconds = _duration(abs(left), abs(last.velocity), conditions.pace, braking=phase(readout) == SLOWING)
     return max(0.0, seconds - (now - last.at))
 
 
@@ -285,6 +286,8 @@ def difference_words(axis: Readout) -> str:
 
 NUMBER = 12
 """Width of the longest position, -2147483648, and a space."""
+COMMANDED = "commanded"
+"""Said of a position that no encoder shows: whether the motor followed is unknown."""
 WORDS = {STATED: "travel", SOFTWARE: "software limits", LEARNT: "between limit switches", SEEN: "seen so far"}
 
 
@@ -341,11 +344,18 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
         verb = f"/referenced {glance.address}".rstrip()
         rows.append(((f"{name} {NOT_REFERENCED}: home it, set it, or {verb}", "strong"),))
     target = axis.conditions.target if axis.conditions is not None and live else None
-    arrow = f"   → {figures.place(target)}" if target is not None else ""
+    own_counter = axis.conditions is not None and axis.conditions.commanded and axis.last is not None
+    arrow = f"   → {figures.place(target)}" if target is not None else f"  {COMMANDED}" if own_counter else ""
     togo = to_go_words(axis, now) if live else ""
     right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
     number, _, own = position.partition(" ")
-    rows.append(spread([(f" {number:>{NUMBER}} ", role), (own or unit, "dim"), (arrow, role)], right, width))
+    rows.append(
+        spread(
+            [(f" {number:>{NUMBER}} ", role), (own or unit, "dim"), (arrow, role if target is not None else "dim")],
+            right,
+            width,
+        )
+    )
     rows += twin_rows(axis, unit, NUMBER, width, dim=role == "dim")
     return [*rows, *_travel_rows(axis, role, width)[: 1 if name else 2]]
 
@@ -370,17 +380,17 @@ def _state(glance: Glance, axis: Readout, now: float, width: int) -> list[Span]:
         state = axis.own_state
         words, role = (f"{state.sign} {state.word}", state.role) if role != "dim" else (words, role)
     live = role not in ("dim", "error")
-    text = f"{words.rstrip()} {phase(axis) if live else ''}".rstrip()
+    text = ", ".join(filter(None, (words.rstrip(), phase(axis) if live else "")))
     return [*name, (f" {fit(text, width - width_of(name) - 1)}", role)]
 
 
 def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
-    """The bar, and the ends of the travel with the way in which they are known."""
+    """The bar, and the ends of the travel with the way in which they are known; no row if none is."""
     travel = travel_of(axis)
-    drawn = "dim" if role == "dim" or travel is None or travel.known_by == SEEN else "text"
-    row: Row = ((f" {bar(axis, width - 2)}", drawn),)
     if travel is None:
-        return [row, ((" travel not known", "dim"),)]
+        return []
+    drawn = "dim" if role == "dim" or travel.known_by == SEEN else "text"
+    row: Row = ((f" {bar(axis, width - 2)}", drawn),)
     low, high = sorted((travel.low, travel.high), key=axis.figures.places.value)
     ends: list[Span] = [(f" {axis.figures.place(low)}", "dim")]
     right: list[Span] = [(f"{axis.figures.place(high)} ", "dim")]

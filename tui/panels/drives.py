@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
+from multidrop.drives.bus import Bus
 from multidrop.shell.line_syntax import join_target
 from multidrop.tui.curves.raster import BRAILLE, Curve, PlotFrame, Raster, TickScale
 from multidrop.tui.curves.samples import Columns, Trace
@@ -153,7 +154,20 @@ def _besides(glance: Glance, axis: Readout, now: float, room: int, *, live: bool
     return program_words(axis, now), "dim" if axis.program_aged(now) else "motion"
 
 
-def drives_rows(view: View, width: int, height: int) -> list[Row]:
+def line_trouble(view: View, bus: Bus) -> tuple[Span, str]:
+    """The state of a line as a sign with a word, and the reason; both empty for a line whose drives reply."""
+    if view.session.tabs.missing(bus):
+        return (f"{ReadoutState.LOST.sign} {ReadoutState.LOST.word}", "error"), str(bus.lost)
+    if bus.lost is not None:
+        return ("· searching", "dim"), "its drives are being searched for"
+    if bus.silent:
+        return (f"{ReadoutState.SILENT.sign} {ReadoutState.SILENT.word}", "error"), "no drive replies"
+    if bus.name in view.session.raw:
+        return ("· raw", "dim"), "typed text goes to the port"
+    return ("", "dim") if bus.drives else ("· no drive", "dim"), ""
+
+
+def compact_rows(view: View, width: int, height: int) -> list[Row]:
     """A row for each drive of the selected bus, with its position over the last seconds; then those of other lines."""
     shown = kept(view.glances, height if len(view.glances) <= height else height - 1)
     rows = [_panel_row(glance, view.now, width) for glance in shown]

@@ -1,9 +1,9 @@
 """The panels by name: what each shows, how much room it takes, what must be polled for it, and its key.
 
-On a wide screen several are shown, in places: below the transcript, and in columns beside it. Where the places are
-rests on the size of the screen and on the panels that a person has hidden, never on what they show. Panels that share a
-place have it in turn: one that has nothing to show leaves it to the next one, and so does the room that it does not
-use. On a narrow screen there is a single panel, below the transcript.
+On a wide screen several are shown, in places: below the transcript, and in a column next to it. The places depend only
+on the size of the screen and on the panels that a person has hidden, never on what they show. Panels that share a place
+have it in turn: the first one leaves the next one the room that it needs at least, and what it does not use itself. One
+that has nothing to show is left out. On a narrow screen there is a single panel, below the transcript.
 
 The panels of the log and of the traffic are here; those of drives, programs and plots have modules of their own.
 """
@@ -19,8 +19,8 @@ from rich.cells import cell_len
 
 from multidrop.shell.raw import hex_of, parts_of, text_of
 from multidrop.tui.panels.drive import drive_title
-from multidrop.tui.panels.drives import drives_rows
-from multidrop.tui.panels.facts import cards_rows, next_rows, selected_rows
+from multidrop.tui.panels.drive_table import drives_rows
+from multidrop.tui.panels.facts import next_rows, selected_rows
 from multidrop.tui.panels.plot import panel_rows, plot_title
 from multidrop.tui.panels.plotted import plot_shows
 from multidrop.tui.panels.program import program_rows, program_shows, program_title
@@ -145,11 +145,10 @@ class Panel(NamedTuple):
 _ALL, _FAST, _FREE = frozenset({MOTION, CONDITIONS}), frozenset({MOTION, PLOT}), frozenset[str]()
 PANELS: tuple[Panel, ...] = (
     Panel("drive", drive_title, selected_rows, 9, 14, _ALL, "position, travel, state, lamps, error and program"),
-    Panel("drives", "drives", drives_rows, 3, 12, _ALL, "every drive of the line in a row"),
+    Panel("drives", "drives", drives_rows, 4, 24, _ALL, "every drive of every line in a row"),
     Panel("program", program_title, program_rows, 3, 60, _ALL, "the lines around the current one", shows=program_shows),
-    Panel("next", "what to press", next_rows, 3, 60, _FREE, "keys, macros and lines that go on from here"),
-    Panel("plot", plot_title, panel_rows, 8, 60, _FAST, "velocity and position of what moves", shows=plot_shows),
-    Panel("cards", "lines and drives", cards_rows, 3, 60, _FREE, "what every line and drive is"),
+    Panel("next", "next", next_rows, 3, 15, _FREE, "what fits the state in front of you, and the macros on keys"),
+    Panel("plot", plot_title, panel_rows, 10, 60, _FAST, "velocity and position of what moves", shows=plot_shows),
     Panel("traffic", traffic_title, traffic_rows, 3, 40, _FREE, "the bytes of the line, both ways", first=False),
     Panel("log", log_title, log_rows, 2, 12, _FREE, "the session log: where, how large, its last entries", first=False),
 )
@@ -158,19 +157,13 @@ PANELS: tuple[Panel, ...] = (
 Place = Sequence[Panel]
 """Panels that share a place."""
 Places = tuple[tuple[str, ...], ...]
-_PLOT, _PROGRAM = ("plot", "cards"), ("program", "next")
-_ASKED_FOR: Places = (("traffic",), ("log",))
-LAYOUTS: dict[tuple[bool, bool], dict[str, Places]] = {
-    (False, False): {"side": (("drive",), ("drives",), _PROGRAM, _PLOT, *_ASKED_FOR)},
-    (False, True): {"panel": (_PLOT,), "side": (("drive",), ("drives",), _PROGRAM, *_ASKED_FOR)},
-    (True, False): {"far": (("drive",), _PLOT), "side": (("drives",), _PROGRAM, *_ASKED_FOR)},
-    (True, True): {
-        "panel": (_PLOT,),
-        "far": (("drive",), ("program", "traffic")),
-        "side": (("drives",), ("next",), ("log",)),
-    },
+_PROGRAM, _ASKED_FOR = ("program", "next"), (("traffic",), ("log",))
+_BELOW = ("drives", "plot")
+LAYOUTS: dict[bool, dict[str, Places]] = {
+    True: {"panel": (_BELOW,), "side": (("drive",), _PROGRAM, *_ASKED_FOR)},
+    False: {"side": (("drive",), ("drives",), _PROGRAM, ("plot",), *_ASKED_FOR)},
 }
-"""The places in each part of a wide screen, from top to bottom, by two columns or one, and by room below."""
+"""The places in each part of a wide screen, from top to bottom; False: a split screen needs the room below."""
 
 
 def panel(name: str) -> Panel:
@@ -190,11 +183,11 @@ class ShownPanels:
         return [[panel(self._alone)]] if self._alone else []
 
     def places(self, wanted: Places) -> list[Place]:
-        """These places of a wide screen with the panels in them. One is there while its first panel is shown."""
+        """These places of a wide screen with the panels that are shown in them; one without any is left out."""
         return [
-            [panel(name) for name in place if self._by_hand.get(name, True)]
+            shown
             for place in wanted
-            if self._by_hand.get(place[0], panel(place[0]).first)
+            if (shown := [panel(name) for name in place if self._by_hand.get(name, panel(name).first)])
         ]
 
     def switch(self, name: str, on: bool, wide: bool) -> None:
@@ -257,10 +250,14 @@ def column_rows(places: Sequence[Place], view: View, width: int, height: int, bo
 def _place_rows(place: Place, view: View, width: int, height: int, side: Row) -> list[Row]:
     """The rows of a place: its panels that have something to show, each in the rows that those before it leave."""
     rows: list[Row] = []
-    for panel in [panel for panel in place if _shows(panel, view)] or place[:1]:
+    shown = [panel for panel in place if _shows(panel, view)] or [*place[:1]]
+    for number, panel in enumerate(shown):
         room = height - len(rows) - HEAD_ROWS
         if room < (panel.least if rows else 0):
             break
+        after = shown[number + 1].least + HEAD_ROWS if number + 1 < len(shown) else 0
+        if room - after >= panel.least:
+            room -= after
         inside = width - len(side)
         title, content = view.boundary.do(
             f"the panel {panel.name}",

@@ -166,7 +166,7 @@ class ControlsPage(SendingPage):
         name = f"{bus}:{name_of(glance)}" if glance is not None else "no drive selected"
         right: Row = (("each key press is one move; ^X stops all ", "dim"),)
         self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
-        self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 18)))
+        self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 19)))
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
         self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)

@@ -126,7 +126,7 @@ class MacrosPage(ListPage):
         if self.host.macros.names is not self._read_for and not self._reading:
             self._reading, self._read_for = True, self.host.macros.names
             self.run_worker(self._read())
-        width, height = self.size.width, max(2, self.size.height - NEWS - 5)
+        width, height = self.size.width, max(2, self.size.height - NEWS - 6)
         playing = {each.name: each for each in view.session.playing}
         self.edited(self.words)
         chosen = self._chosen()

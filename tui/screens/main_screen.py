@@ -75,17 +75,15 @@ class SideTranscript(Vertical):
 
 WIDE_FROM = (110, 24)
 """Smallest width and height with a column of panels."""
-TALL = 32
-"""Smallest height with panels below the transcript, too."""
-VERY_WIDE = 200
-"""Smallest width with two columns."""
+TALL, FEW_ROWS = 32, 7
+"""Height from which the panels below the transcript take their share; below it they have so many rows."""
 HALF = 60
 """Width from which the halves of a split screen are side by side; else they are one above the other."""
-PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "tour", "status", "label", "hint")
+PLAIN = ("panel", "side", "rule-below", "tour", "status", "label", "hint")
 """Parts that are only rows."""
 MENU_WIDTH = 64
-PANEL_SHARE = 0.5
-"""Share of the transcript's height that a panel takes on a narrow screen."""
+PANEL_SHARE, WIDE_SHARE = 0.5, 0.55
+"""Share of the height that the panels below the transcript take, on a narrow and on a wide screen."""
 
 
 class MainScreen(Framed):
@@ -131,7 +129,7 @@ class MainScreen(Framed):
     def compose(self) -> ComposeResult:
         yield Roles()
         yield self.lines("top")
-        yield self.lines("rule-above")
+        yield self.lines("now")
         yield Banner()
         with Horizontal(id="body"):
             with Vertical(id="left"):
@@ -139,7 +137,6 @@ class MainScreen(Framed):
                 yield self.reader
                 yield self.lines("told")
                 yield self.lines("panel")
-            yield self.lines("far")
             yield self.lines("side")
         yield self.lines("rule-below")
         yield self.lines("tour")
@@ -158,13 +155,10 @@ class MainScreen(Framed):
         return self.size.width >= WIDE_FROM[0] and self.size.height >= WIDE_FROM[1]
 
     def columns(self) -> list[tuple[str, list[Place]]]:
-        """The parts that hold panels, and the places in each, from top to bottom.
-
-        A split screen needs the room below the transcript.
-        """
+        """The parts that hold panels, and the places in each, from top to bottom."""
         if not self.wide:
             return [("panel", self.panels.alone())]
-        layout = LAYOUTS[self.size.width >= VERY_WIDE, self.size.height >= TALL and not self.beside.display]
+        layout = LAYOUTS[not self.beside.display]
         return [(name, self.panels.places(places)) for name, places in layout.items()]
 
     def wants(self) -> frozenset[str]:
@@ -175,17 +169,17 @@ class MainScreen(Framed):
     def make_room(self) -> None:
         wide, width = self.wide, self.size.width
         columns = dict(self.columns())
-        for name in ("panel", "far", "side"):
+        for name in ("panel", "side"):
             self.lines(name).display = bool(columns.get(name))
         side = side_width(width)
-        self.lines("side").styles.width = self.lines("far").styles.width = side
+        self.lines("side").styles.width = side
         self.lines("status").display = not wide
-        share = int((self.size.height - 7) * PANEL_SHARE)
+        room = self.size.height - 7
+        share = FEW_ROWS if wide and self.size.height < TALL else int(room * (WIDE_SHARE if wide else PANEL_SHARE))
         self.lines("panel").styles.height = max([share, *(place[0].least + 1 for place in columns.get("panel", []))])
-        beside = sum(side for name in ("far", "side") if columns.get(name))
-        junctions = range(width - beside, width, side)
-        self.lines("rule-above").put([rule_row(width, junctions, "┬")])
-        self.lines("rule-below").put([rule_row(width, junctions, "┴")])
+        beside = side if columns.get("side") else 0
+        self.junctions = (width - beside,) if beside else ()
+        self.lines("rule-below").put([rule_row(width, self.junctions, "┴")])
         self._halves.set_class(width - beside >= 2 * HALF, "side-by-side")
         self.show_menu()
         self._fit_hint()

@@ -46,7 +46,9 @@ class Framed(Keyed, Screen[None]):
         self._compositor = FrontCompositor()
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts: dict[str, Lines] = {"top": TopLine(id="top"), "footer": Footer(id="footer")}
-        self._parts["told"] = Lines(id="told")
+        self._parts |= {name: Lines(id=name) for name in ("now", "told")}
+        self.junctions: tuple[int, ...] = ()
+        """The columns at which the rule below the tabs joins a border."""
         self.told = ""
         """The line on the last key, which is shown for a while."""
 
@@ -127,6 +129,7 @@ class Page(Framed, metaclass=AbstractScreen):  # type: ignore[metaclass]
 
     def compose(self) -> ComposeResult:
         yield self.lines("top")
+        yield self.lines("now")
         yield Banner()
         with Vertical(classes="page-body") as self.body:
             yield from self.content()

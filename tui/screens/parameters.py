@@ -331,7 +331,7 @@ class ParametersPage(ListPage, SendingPage):
             return [((" ^O chooses a drive", "dim"),)]
         if self._settings() is None:
             room = self.lines("table").size
-            known = column_rows([[panel("drive")], [panel("cards")]], view, room.width, max(0, room.height - 2), False)
+            known = column_rows([[panel("drive")], [panel("drives")]], view, room.width, max(0, room.height - 2), False)
             return [
                 ((" not read yet: ^P, read again, reads every setting; nothing is changed by it", "strong"),),
                 (),

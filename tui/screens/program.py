@@ -155,7 +155,7 @@ class ProgramPage(Page):
         self.editor.show_marks(marks, line)
         side = self.lines("program-side")
         if side.display:
-            places = [[panel("drive")], [panel(name) for name in ("program", "plot", "cards")]]
+            places = [[panel("drive")], [panel(name) for name in ("program", "plot", "drives")]]
             side.put(column_rows(places, view, side.size.width, side.size.height, border=True))
 
     @property

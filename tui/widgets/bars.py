@@ -131,6 +131,8 @@ class Footer(Lines):
 
 NAME = " multidrop  "
 TROUBLE = frozenset({ReadoutState.LOST, ReadoutState.SILENT, ReadoutState.TROUBLE, ReadoutState.DIFFERS})
+STATE_WORD = 7
+"""Width of the word of a state in a tab; `no current` alone is longer."""
 LONGEST_TAB_NAME = 24
 """Greatest width of a name in a tab."""
 SHORT = 10
@@ -163,7 +165,9 @@ class Tab:
 
 def tab_spans(tab: Tab) -> list[Span]:
     """Format ` 1 press ▶ moving `, in a width that does not change with the state."""
-    return _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST_TAB_NAME)} ", f"{tab.state.sign} {tab.state.word:<6}")
+    blank = " " * (STATE_WORD - len(tab.state.word))
+    spans = _spans(tab, f" {tab.number} {_cut(tab.name, LONGEST_TAB_NAME)} ", f"{tab.state.sign} {tab.state.word}", " ")
+    return [*spans, (blank, spans[0][1])] if blank else spans
 
 
 def _named(tab: Tab, name: str = "") -> list[Span]:

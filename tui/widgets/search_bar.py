@@ -172,7 +172,8 @@ class SearchBar(Horizontal):
 
     def _copy(self, picked: Picked) -> None:
         """Send the picked lines to the clipboard of the terminal, which says nothing about it."""
-        text, said = "\n".join(record.text for record in picked.records), size_of(picked)
+        lines = (line for record in picked.records for line in (record.text, *record.details))
+        text, said = "\n".join(lines), size_of(picked)
         if len(text) > MOST_COPIED:
             self.app.notify(f"{said}: too much for a terminal's clipboard; /save FILE writes a file", timeout=6)
             return

@@ -31,12 +31,13 @@ MARKS = {
     "x": ("✗", "error"),
     ".": ("·", "dim"),
     "!": ("!", "strong"),
+    "■": ("■", "text"),
 }
-"""Typed by a person, sent by automation, reply, unsolicited, bytes out, bytes in, failure, narration, warning."""
+"""Typed by a person, sent by automation, reply, unsolicited, bytes out, bytes in, failure, narration, warning, stop."""
 SENT = frozenset(">»")
 VERBATIM = frozenset({">", "»", "<", "", "↑", "↓"})
 """Marks of records in a drive's own language, where every space counts."""
-DATED = frozenset(">»<↑↓.!")
+DATED = frozenset(">»<↑↓.!■")
 """Marks of records that show the time of day; a reply follows the line that it answers."""
 ADDRESS, WIDEST_LINE_NAME = 3, 12
 """Least and greatest width of the name of a drive in cells."""
@@ -88,6 +89,8 @@ def rows_of(record: Record, before: Record | None, clocks: Clocks, width: int) -
     sign, role = MARKS[record.mark]
     text = visible(record.text)
     room = max(1, width - clocks.gutter - 1)
+    if record.details:
+        text = fit(text, min(len(text), room))
     broken = laid_out if record.columns else chop_cells if record.mark in VERBATIM else at_words
     pieces = [text] if len(text) <= room // 2 else broken(text, room) or [""]
     time = "" if clocks.form == "off" else f"{fit(clocks.text(record, before), CLOCK)}  "
@@ -167,7 +170,8 @@ class Transcript(Lines, can_focus=False):
     def take(self, records: Iterable[Record]) -> None:
         """Take in records, oldest first; `show_new` shows them."""
         new = list(records)
-        self.records.take(new)
+        for number in self.records.take(new):
+            self._made.pop(number, None)
         names = max((len(record.name) for record in new), default=0)
         self.clocks = self.clocks._replace(
             start=self.records.began, names=max(self.clocks.names, min(names, WIDEST_LINE_NAME))
@@ -274,7 +278,9 @@ class Transcript(Lines, can_focus=False):
     def _decorated(self, number: int, rows: list[Row]) -> list[Row]:
         """The rows of a record with the marks of a search or a selection."""
         if self.picked is not None and number in self.picked:
-            return [chosen(row) for row in rows]
+            blank = " " * self.clocks.gutter
+            details: list[Row] = [((f"{blank}{visible(text)}", "text"),) for text in self.records[number].details]
+            return [chosen(row) for row in (*rows, *details)]
         text = self.search.text if self.search is not None else ""
         if not text or text.casefold() not in self.records[number].text.casefold():
             return rows

@@ -21,6 +21,8 @@ from multidrop.tui.screen_model import MOST_FRESH_RECORDS, Record
 # records are dropped.
 
 
+MOST_BETWEEN = 200
+"""Records after one that a later record may still replace."""
 MOST_TEXT = 8_000_000
 """Characters of all kept records: fifty thousand long lines would take gigabytes."""
 
@@ -56,9 +58,21 @@ class Records:
         """The records that were dropped because newer ones needed their room."""
         return self.first - self.cleared
 
-    def take(self, new: Sequence[Record]) -> None:
-        """Take in records, oldest first, and drop the oldest that do not fit; the newest one always stays."""
-        kept = self._kept
+    def take(self, new: Sequence[Record]) -> list[int]:
+        """Take in records, oldest first, and drop the oldest that do not fit; the newest one always stays.
+
+        Return the numbers of earlier records that were replaced.
+        """
+        kept, replaced, further = self._kept, list[int](), list[Record]()
+        for record in new:
+            number = self._joined(record.joins) if record.joins else None
+            if number is None:
+                further.append(record)
+                continue
+            self._room += len(self[number].text) - len(record.text)
+            kept[number - self.first] = record
+            replaced.append(number)
+        new = further
         if not self.taken and new:
             self.began = new[0].at
         kept.extend(new)
@@ -66,6 +80,12 @@ class Records:
         self._room -= sum(len(record.text) for record in new)
         while len(kept) > self._most or (self._room < 0 and len(kept) > 1):
             self._room += len(kept.popleft().text)
+        return replaced
+
+    def _joined(self, joins: int) -> int | None:
+        """The number of the record among the last ones that one with this mark replaces."""
+        last = islice(reversed(self._kept), MOST_BETWEEN)
+        return next((self.taken - 1 - n for n, record in enumerate(last) if record.joins == joins), None)
 
     def clear(self) -> None:
         self._room += sum(len(record.text) for record in self._kept)

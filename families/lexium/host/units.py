@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
 
 from multidrop.dialects.codec import Request
-from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
+from multidrop.dialects.units import FULL_STEPS, VALUE, Basis, Field, Takes, Units
 from multidrop.families.lexium.host import classify
 from multidrop.families.lexium.manual.groups import MOVES, RECOUNTING, RESTORING, ROWS, SCALES
 from multidrop.families.lexium.manual.mnemonic import EVERY, MDRIVE_PLUS, WordQuantity
@@ -24,7 +24,6 @@ TAKES: Mapping[str, Takes] = {row.name: takes for row, takes in _MEASURES if row
 """What the number that a line gives to a word measures."""
 READS: Mapping[str, Takes] = {row.name: takes for row, takes in _MEASURES if row.access in ("RW", "RO", "RC")}
 """What the number that PR prints for a word measures."""
-FULL_STEPS = 200
 LINES_LMD, COUNTS_MDI = 1000, 2048
 _LINE = re.compile(rf"\s*({'|'.join(TAKES)})\s*=?\s*{VALUE}\s*(?:,[^'`]*)?(?:['`].*)?", re.I)
 _READ = re.compile(r"\s*PR\s*([A-Z]+)\s*", re.I)

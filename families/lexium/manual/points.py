@@ -91,6 +91,7 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
         run_current=_whole(facts, "RC"),
         hold_current=_whole(facts, "HC"),
         more=more,
+        commanded=facts.get("EE") == 0 and not facts.get("AS"),
         unit="counts" if counting(facts) else "steps",
         pace=Pace(*pace) if len(pace) == 4 else None,
     )

@@ -244,6 +244,7 @@ def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
         clears=clearing(axis) if code else "",
         disabled=f"EO{DRIVERS[axis]}=0" if on is not None and not on & DRIVERS[axis] else "",
         more=tuple(more),
+        commanded=facts.get(f"SL{axis}") == 0,
         unit="counts" if facts.get(f"SL{axis}") else "pulses",
         pace=_pace(axis, facts),
     )

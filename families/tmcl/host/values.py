@@ -228,6 +228,7 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
         run_current=None if run is None else round(run * 100 / FULL_CURRENT),
         hold_current=None if hold is None else round(hold * 100 / FULL_CURRENT),
         released="parameter 7 is 0" if hold == 0 else freewheels,
+        commanded=True,  # the ramp's counter (axis parameter 1); an encoder has one of its own (209)
         unit="microsteps",
         speed="of 2047" if chip else "",
         pace=Pace(0, speed, ramp, ramp) if speed and ramp and not chip else None,

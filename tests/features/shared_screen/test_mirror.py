@@ -111,7 +111,7 @@ async def test_a_watcher_sees_and_stops_what_the_host_has() -> None:
         assert list(zip(own.at, own.values, strict=True))[-len(other.at) :] == [
             *zip(other.at, other.values, strict=True)
         ]
-        await pair.until(lambda: "5.00000 mm" in shown(watcher))
+        await pair.until(lambda: "5.000 mm" in shown(watcher))
         names = pair.feed.watchers
         assert names
         await pair.until(lambda: "watched by 1" in shown(watcher) and names[0][:20] in shown(pair.host))
