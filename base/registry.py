@@ -35,6 +35,7 @@ OPERATIONS: tuple[str, ...] = (
     "multidrop.commands.operations",
     "multidrop.shell.verbs.buses",
     "multidrop.shell.verbs.units",
+    "multidrop.shell.verbs.setup",
     "multidrop.shell.verbs.raw",
     "multidrop.shell.verbs.sim",
     "multidrop.shell.verbs.settings",

@@ -41,6 +41,11 @@ class Counting:
         self._accepted[axis] = settings
         self._read[axis] = recounts, settings
 
+    def forget(self, axis: str) -> None:
+        """Record that an axis has no scale any more."""
+        self._accepted.pop(axis, None)
+        self._read.pop(axis, None)
+
     def saw(self, axis: str, settings: Settings, recounts: int) -> None:
         """Record the settings that a reading has shown, which began when `recounts` had this value."""
         self._read[axis] = recounts, settings

@@ -32,7 +32,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -271,6 +271,14 @@ def _units(key: str, found: Any, where: str, own: Sequence[str]) -> dict[str, Sc
     return scales
 
 
+def check_label(label: str) -> None:
+    """Raise Diagnostic for a text that cannot be the name of a drive."""
+    if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label or acts_first(label):
+        raise Diagnostic(
+            f"{label!r} is not a name", "", f"invalid: spaces, control characters, :, @ and /; {NOT_FIRST}"
+        )
+
+
 def _connection(name: str, found: Any, where: str, own: Sequence[str]) -> SavedConnection:
     key = f"connections.{name}"
     if not re.fullmatch(r"[A-Za-z0-9_-]+", name) or acts_first(name):
@@ -283,9 +291,10 @@ def _connection(name: str, found: Any, where: str, own: Sequence[str]) -> SavedC
     if not isinstance(names, dict) or not all(isinstance(label, str) and label for label in names.values()):
         raise Diagnostic(f"{key}.names is not a table of names", where, 'as in { a = "gantry" }')
     for label in names.values():
-        if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label or acts_first(label):
-            hint = f"invalid: spaces, control characters, :, @ and /; {NOT_FIRST}"
-            raise Diagnostic(f"{key}.names: {label!r} is not a name", where, hint)
+        try:
+            check_label(label)
+        except Diagnostic as problem:
+            raise Diagnostic(f"{key}.names: {problem.message}", where, problem.hint) from None
     scales = _units(f"{key}.units", table.get("units", {}), where, own)
     return SavedConnection(name, url, names, scales, os.path.abspath(os.path.dirname(where)))
 
@@ -368,8 +377,21 @@ def keep(table: str, key: str, value: str | list[str]) -> Path:
     return _write(_checked(document))
 
 
+def change(edit: Callable[[Any], None]) -> tuple[Path, Settings]:
+    """Change the file; `edit` is given its document, which keeps comments and layout, and all that it leaves alone.
+
+    Return the file, which is replaced as a whole, and what it has now. Raises Diagnostic, and then nothing has changed.
+    """
+    document = _document()
+    edit(document)
+    text = _checked(document)
+    return _write(text), parse(text, str(config_file()))
+
+
 def _write(text: str) -> Path:
     path = config_file().resolve()
+    if path.exists() and not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):
+        raise Diagnostic("is read-only, so nothing was changed", str(path), f"chmod u+w {path} allows it")
     try:
         write_atomically(path, text.encode())
     except OSError as problem:

@@ -58,7 +58,7 @@ async def _check(units: SessionUnits, drive: Drive, field: Field, axis: ScaledAx
     assert travel is not None
     takes = await units.target([drive], [field]) or field.takes
     measure = await units.measure(drive, field.axis)
-    now = await units.read(drive, field.axis, axis.scale)
+    now = await units.read(drive, field.axis, axis.scale.full_steps)
     if axis.basis is None or now.settings != axis.basis.settings:
         units.lost(drive, field.axis, axis)
     if not units.referenced(drive, field.axis):

@@ -101,6 +101,7 @@ class SessionUnits:
         self.shown = True
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, ScaledAxis]] = WeakKeyDictionary()
+        self._bases: WeakKeyDictionary[Drive, dict[tuple[str, int | None], Basis]] = WeakKeyDictionary()
         workspace.subscribe(self._overhear, Unsolicited)
         self._checks = ScaleChecks(workspace)
 
@@ -202,10 +203,17 @@ class SessionUnits:
         self.workspace.scaled = True
         return axes[axis]
 
+    def remove(self, drive: Drive, axis: str) -> None:
+        """Take the scale of an axis away: its numbers are the drive's own again."""
+        axes = self.axes(drive)
+        axes.pop(axis, None)
+        drive.counting.forget(axis)
+        _anchor(drive, axes)
+
     async def confirm(self, drive: Drive) -> None:
         """Read what the scales of a drive rest on, and take it as it is. Raises DriveError or TransportLost."""
         for name, axis in self.axes(drive).items():
-            recounts, basis = drive.state.recounts, await self.read(drive, name, axis.scale)
+            recounts, basis = drive.state.recounts, await self.read(drive, name, axis.scale.full_steps)
             axis.accept(basis)
             drive.counting.accept(name, basis.settings, recounts)
             if _runs(drive):
@@ -231,8 +239,15 @@ class SessionUnits:
                 if address not in known or name.lower() not in axes:
                     workspace.notify(f"{bus.name}: units has {key}, which no drive there is", warning=True)
 
-    async def read(self, drive: Drive, axis: str, scale: Scale) -> Basis:
-        return await drive.run(drive.family.units.basis(axis, scale.full_steps))
+    async def read(self, drive: Drive, axis: str, full_steps: int | None) -> Basis:
+        """Read what the counting of an axis rests on. Raises DriveError or TransportLost."""
+        basis = await drive.run(drive.family.units.basis(axis, full_steps))
+        self._bases.setdefault(drive, {})[axis, full_steps] = basis
+        return basis
+
+    def last_read(self, drive: Drive, axis: str, full_steps: int | None) -> Basis | None:
+        """What the counting of an axis rests on, as it was last read; None: it was not."""
+        return self._bases.get(drive, {}).get((axis, full_steps))
 
     async def measure(self, drive: Drive, axis: str) -> Measure:
         """The measure of an axis; what it rests on is read where it was not. Raises Diagnostic where there is none."""

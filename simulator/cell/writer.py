@@ -11,6 +11,7 @@ from multidrop.base.files import escaped_toml
 from multidrop.base.text import visible
 from multidrop.dialects.units import PLACES, Scale
 from multidrop.dialects.values import Reading, same
+from multidrop.dialects.written_scales import written
 from multidrop.simulator.cell.drive_keys import LONGEST_TEXT_VALUE
 from multidrop.simulator.declared import own_ports
 
@@ -136,14 +137,8 @@ def _drive(drive: DriveText) -> Any:
 
 def _written(scale: Scale) -> Any:
     """A scale as it is read again: its text, or a table where it has more."""
-    written: dict[str, str | int] = {"scale": str(scale)}
-    if scale.anchored:
-        written["zero"] = scale.shown(scale.zero)
-    if scale.travel is not None:
-        written["travel"] = scale.shown_travel
-    if scale.full_steps is not None:
-        written["full_steps"] = scale.full_steps
-    return _inline(written) if len(written) > 1 else str(scale)
+    table = written(scale)
+    return _inline(table) if len(table) > 1 else str(scale)
 
 
 def _inline(found: Mapping[str, Any]) -> Any:

@@ -51,6 +51,7 @@ class FakeDrive:
     label: str = ""
     product: str = "LMDCM"
     version: str = "6.002"
+    link: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(name="press"))
     programming: bool = False
     stores: bool = False
     unreferenced: frozenset[str] = frozenset()
@@ -162,6 +163,9 @@ class FakeUnits(SessionUnits):
         found.accept(Basis((("MS", "256"),), Fraction(turn)))
         return found
 
+    def last_read(self, drive: Any, axis: str, full_steps: int | None) -> Basis | None:
+        return Basis((("MS", "256"),), Fraction(51200))
+
     def of(self, drive: Any, axis: str = "") -> ScaledAxis | None:
         return self.given_axes.get((drive.address, axis))
 
@@ -237,6 +241,12 @@ class FakeSession:
 
     def of_demo(self, bus: str) -> str:
         return bus if bus in self.buses else ""
+
+    def of(self, bus: FakeBus) -> SimpleNamespace:
+        return SimpleNamespace(connection=None)
+
+    def qualified_address(self, drive: FakeDrive) -> str:
+        return f"{self.selected_bus}:{drive.address}"
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[FakeBus]:
         if url not in self.openable:

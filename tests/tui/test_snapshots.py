@@ -365,6 +365,25 @@ def test_page(snap_compare: Compare, name: str, size: str) -> None:
     assert drawn(snap_compare, size, act)
 
 
+# Forms
+
+FORMS = {"setup": ("down", "enter", *"5 mm", "enter", "down", "enter", *"0 to 300", "enter", "ctrl+s")}
+
+
+@pytest.mark.parametrize("size", BOTH)
+@pytest.mark.parametrize("name", FORMS)
+def test_form(snap_compare: Compare, name: str, size: str) -> None:
+    async def act(pilot: Pilot[int], session: FakeSession) -> None:
+        await emit(pilot, *a_talk(session), *a_move(session))
+        await pilot.app.run_action(f"act.page('{name}')")
+        await settle(pilot)
+        if name == "setup":
+            await press(pilot, *["down"] * 7, "enter", *"press", "enter", *["up"] * 7)
+        await press(pilot, *FORMS[name])
+
+    assert drawn(snap_compare, size, act)
+
+
 # Programs, macros and traffic
 
 TEXT = """' Goes there and comes back.
