@@ -457,7 +457,8 @@ class ParametersPage(ListPage, SendingPage):
             return
         try:
             if asked.kind == FILE:
-                self._file(text)
+                done = lambda: self._close("") if self.asked is asked else None
+                self._file_column.show(text, self.host.session.selected, done)
             elif asked.kind == DRIVE:
                 self._table.compare(text, settings_of(self.host, text))
                 self._close("")
@@ -467,12 +468,6 @@ class ParametersPage(ListPage, SendingPage):
                 self._type_with_file(asked.kind, text)
         except Diagnostic as failure:
             self.say(f"nothing was sent: {failure}")
-
-    def _file(self, text: str) -> None:
-        asked = self.asked
-        self._file_column.show(
-            text, self.host.session.selected, lambda: self._close("") if self.asked is asked else None
-        )
 
     def _type_with_file(self, kind: str, text: str) -> None:
         """Type `/params backup FILE` or `/params restore FILE`, which asks before it sends anything."""
