@@ -457,8 +457,9 @@ class ParametersPage(ListPage, SendingPage):
             return
         try:
             if asked.kind == FILE:
-                done = lambda: self._close("") if self.asked is asked else None
-                self._file_column.show(text, self.host.session.selected, done)
+                self._file_column.show(
+                    text, self.host.session.selected, lambda: self._close("") if self.asked is asked else None
+                )
             elif asked.kind == DRIVE:
                 self._table.compare(text, settings_of(self.host, text))
                 self._close("")
