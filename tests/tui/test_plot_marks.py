@@ -53,7 +53,7 @@ def test_lines_and_errors_are_on_the_curve_at_their_time_with_their_text_where_r
         " a gantry steady at 1000 steps/s",
         " position a gantry steps 20000 ",
         "         │                                        ",
-        "     20k ┤                      error 20     *****",
+        "     20k ┤                     error 20      *****",
         "         │                             E******    ",
         "         │                      ********          ",
         "     10k ┤               ********                 ",
