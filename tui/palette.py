@@ -12,7 +12,7 @@ from textual.fuzzy import Matcher
 from multidrop.base.files import rows
 from multidrop.shell.hooks import switches as added
 from multidrop.shell.session import Session
-from multidrop.tui.key_table import SHEETS, all_groups
+from multidrop.tui.key_table import SHEETS, STOP, all_groups, footer
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.table import PANELS
 from multidrop.tui.screens.dialogs import Match
@@ -188,13 +188,22 @@ def _shown(command: PaletteCommand, width: int) -> Text:
 
 Entry = tuple[str, str]
 """A key, a line or a sign, and its meaning; a heading has an empty meaning."""
+MOST_USED = 6
+"""The number of keys at the beginning of the help, with the stop."""
 KEY = 15
 """Width of keys, lines and signs."""
 
 
 def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
-    """All help for a page or a box: what it is for, its keys in groups, the pages that are near, and the rest."""
+    """Return all help for a page or a box.
+
+    It begins with what it is for in a few sentences, and the keys that are used most. All its keys in groups follow,
+    then the pages that are near, and the rest.
+    """
     listed: list[Entry] = [(SHEETS[sheet].title.capitalize(), ""), ("", SHEETS[sheet].about)]
+    most = [key for key in footer(sheet) if key.name != "help"][: MOST_USED - 1]
+    listed += [("Used most", ""), (STOP.shown, STOP.about)]
+    listed += [(keys.shown(key.name) if key.name else key.shown, key.about) for key in most]
     groups = all_groups(sheet)
     near = groups.pop("Pages", [])
     for group, of_group in groups.items():
@@ -221,11 +230,13 @@ def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
 
 
 def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:
-    """The entries that contain every typed word, each wrapped between words."""
+    """Return the entries that contain every typed word, each once, wrapped between words; all for an empty text."""
     wanted = typed.casefold().split()
     matches = []
     for number, (key, what) in enumerate(entries):
-        if (what or not wanted) and all(word in f"{key} {what}".casefold() for word in wanted):
+        if wanted and (not what or (key, what) in entries[:number]):
+            continue
+        if all(word in f"{key} {what}".casefold() for word in wanted):
             matches.append(Match(str(number), _wrapped(visible(key), visible(what), width)))
     return matches
 
