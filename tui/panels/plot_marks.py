@@ -1,8 +1,8 @@
 """Marks in a chart: what happened to its drives, on their curves, and the ends of their travel.
 
-A mark is a sign on the curve at its time, with its text where the cells next to it are empty. An end of travel is a dashed
-line with its value, or an arrow with the value at the edge beyond which it is. Nothing here hides a curve but the sign
-of a mark, one cell.
+A mark is a sign on the curve at its time, with its text where the cells next to it are empty. An end of travel is a
+dashed line with its value, or an arrow with the value at the edge beyond which it is. Nothing here hides a curve but
+the sign of a mark, one cell.
 """
 
 from __future__ import annotations
