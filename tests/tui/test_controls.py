@@ -17,7 +17,8 @@ from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
 from multidrop.tui.readout import Readout, ReadoutState
-from multidrop.tui.screens.controls import ControlsPage, Jog
+from multidrop.tui.screens.controls import ControlsPage
+from multidrop.tui.screens.jogging import Jog
 from tests.support.fake_session import FakeSession, demo_session, emit, on_screen, press, settle
 
 at_screen = pytest.mark.tui
@@ -391,6 +392,9 @@ async def test_any_other_blank_in_an_entry_is_the_stop(before: tuple[str, ...], 
         await opened(pilot, session)
         await press(pilot, *before, *keys)
         assert session.sent[-1:] == ["press:a SL 0"]
+        session.sent.clear()
+        await press(pilot, *"mm", "enter")
+        assert session.sent == [], "what was begun before the stop is not used"
 
 
 WRONG = (

@@ -10,126 +10,39 @@ after another one is the keyboard's repetition. What does not count is dropped a
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from string import ascii_letters, digits, punctuation
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
 from multidrop.base.errors import Diagnostic
-from multidrop.base.text import counted
-from multidrop.dialects.controls import (
-    BY,
-    DISABLE,
-    ENABLE,
-    HIGH,
-    HOME_MINUS,
-    HOME_PLUS,
-    LOW,
-    STOP,
-    TO,
-    Control,
-    Controls,
-)
+from multidrop.dialects.controls import BY, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO
 from multidrop.dialects.units import Takes
 from multidrop.shell.amounts import Amount, AmountReader
 from multidrop.tui.key_table import SHEETS, shown_key
-from multidrop.tui.panels.drive import drive_rows, unit_of
-from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.readout import READ, Readout, ReadoutState
+from multidrop.tui.panels.drive import drive_rows
+from multidrop.tui.panels.view import View, name_of
+from multidrop.tui.readout import READ
+from multidrop.tui.screens.chosen_axis import ChosenAxis
+from multidrop.tui.screens.control_entries import ENTRIES, asked_row, moving_lines, read
+from multidrop.tui.screens.control_rows import (
+    KEYED,
+    NO_CONTROLS,
+    SPACE,
+    WORDS,
+    control_rows,
+    jog_rows,
+    readiness,
+)
+from multidrop.tui.screens.jogging import Jog
 from multidrop.tui.screens.page import PageHost, SendingPage, show_rows
-from multidrop.tui.text import at_words, fit
-from multidrop.tui.widgets.lines import Row, Span, spread, width_of
-
-REPETITION = 0.2
-"""Seconds between two presses below which the second is the repetition of a held key."""
-SETTLE = 0.05
-"""Seconds after the end of a line before a reading shows what the line has done."""
-
-
-@dataclass
-class Jog:
-    """The presses of one page."""
-
-    dropped: int = 0
-    """Presses that did not count since the last one that did."""
-    why: str = ""
-    """The reason of the last drop."""
-    _pressed: float = -math.inf
-    _busy: float = -math.inf
-    """When a line was last seen to run or wait."""
-
-    def look(self, now: float, *, idle: bool) -> None:
-        if not idle:
-            self._busy = now
-
-    def allows(self, readout: Readout, axis: Readout, state: ReadoutState, now: float, *, idle: bool) -> bool:
-        """True if a press at this time counts; one that does not is dropped."""
-        self.look(now, idle=idle)
-        repeated = now - self._pressed < REPETITION
-        self._pressed = now
-        self.why = "a key that is held repeats" if repeated else self.obstacle(readout, axis, state, now)
-        if self.why:
-            self.dropped += 1
-            return False
-        self.dropped, self._busy = 0, now
-        return True
-
-    def obstacle(self, readout: Readout, axis: Readout, state: ReadoutState, now: float) -> str:
-        """The reason for which no move may start now; empty: it may."""
-        if restless := self.restless(readout, axis, state, now):
-            return restless
-        if axis.conditions is not None and axis.conditions.disabled:
-            return f"no current in the motor ({axis.conditions.disabled})"
-        if axis.conditions is not None and axis.conditions.blocked:
-            return axis.conditions.blocked
-        return "a program runs" if readout.program.name else ""
-
-    def restless(self, readout: Readout, axis: Readout, state: ReadoutState, now: float) -> str:
-        """What leaves open whether the axis rests; empty: it rests."""
-        if state not in READ or axis.last is None:
-            return f"it is {'not read yet' if state is ReadoutState.UNKNOWN else state.word}"
-        if state is ReadoutState.MOVING or axis.last.velocity != 0:
-            return "it moves"
-        if self._busy == now:
-            return "a line is on its way"
-        if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):
-            return "it has not been read at rest since the last line"
-        return ""
-
+from multidrop.tui.text import at_words
+from multidrop.tui.widgets.lines import Row, spread
 
 FIRST_STEP = "100"
 """The length of a step until a person chooses one, in the drive's own counts."""
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A key that asks for an amount. `control`: the one that takes it; empty: it is the length of a step."""
-
-    control: str
-    what: str
-    takes: Takes
-
-
-ENTRIES = {
-    "m": Entry(TO, "move to a position", Takes.PLACE),
-    "b": Entry(BY, "move by a distance", Takes.DISTANCE),
-    "l": Entry("", "length of a step", Takes.DISTANCE),
-}
-SPACE = "space"
-KEYED = {"-": HOME_MINUS, "+": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
-"""Keys of controls. Enter sends them, apart from the stop; a direction counts after `h`."""
-WORDS = {
-    TO: "move to",
-    BY: "move by",
-    HOME_MINUS: "home −",
-    HOME_PLUS: "home +",
-    STOP: "stop",
-    ENABLE: "enable",
-    DISABLE: "disable",
-}
-NO_CONTROLS = "this family has no controls"
 LEFT = "nothing was sent: the entry was left without Enter"
 KEYS = "; ".join(
     f"{key.shown} {key.word or key.about.split(':')[0]}" for key in SHEETS["controls"].keys if key.word or key.name
@@ -137,9 +50,6 @@ KEYS = "; ".join(
 """The keys that work, for a person who pressed another one."""
 PRINTED = [*ascii_letters, *digits, *(each for each in punctuation if each != ","), "comma"]
 """Every key that prints something."""
-KEY = 9
-WORD = 10
-LINE = 22
 
 
 class ControlsPage(SendingPage):
@@ -160,13 +70,13 @@ class ControlsPage(SendingPage):
         super().__init__(host)
         self.step = FIRST_STEP
         self._jog = Jog()
-        self._axis = 0
+        self._axis = ChosenAxis(host)
         self._homing = False
         """The next key may be the direction of a homing."""
-        self._place = host.session.place
-        self._view: View | None = None
         self._before = ""
         """What the entry held before the last key."""
+        self._void = False
+        """The entry is not used any more: Space stopped the axis while it was open."""
 
     def on_mount(self) -> None:
         """Hide the field until a number is asked for; what failed before is not the page's."""
@@ -177,11 +87,10 @@ class ControlsPage(SendingPage):
 
     def show(self, view: View) -> None:
         """Paint the drive, and the controls with the lines that they send now."""
-        self._view = view
-        # Forget a number that was begun before a stop, or for another drive.
+        # Forget what was begun before a stop, or for another drive.
         place = view.session.place
-        if place != self._place:
-            self._place, self._axis, self._jog = place, 0, Jog()
+        if self._axis.shown(view):
+            self._jog = Jog()
         asked = self.asked
         if asked is not None and asked.overtaken(self.host.session):
             self._close("stopped; the entry was not used" if asked.place == place else "another drive is selected")
@@ -199,59 +108,27 @@ class ControlsPage(SendingPage):
         right: Row = (("each key press is one move; ^X stops all ", "dim"),)
         self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
         self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 19)))
-        self.lines("controls").put(self._rows(view, glance, width))
-        show_rows(self.lines("asked"), self._asked_rows(width))
+        self._paint_controls(view, width)
         said: list[Row] = [((f" {row}", self.said[1]),) for row in at_words(self.said[0], width - 2)]
         show_rows(self.lines("said"), said or [((" ", "text"),)])
         self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
-    def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
-        controls = self._controls()
-        if glance is None or not controls:
-            return [((" ^O chooses a drive" if glance is None else f" {NO_CONTROLS}", "dim"),)]
-        axes = glance.readout.axes
-        axis = axes[min(self._axis, len(axes) - 1)]
-        other = "   Tab chooses the axis" if len(axes) > 1 else ""
-        reader = self._reader(glance, axis)
-        step = self._step(reader)
-        other_way = reader.other(step, Takes.DISTANCE)
-        head: list[Span] = [
-            ("─ ", "rule"),
-            (f"jog {axis.axis}".rstrip() + "  ", "dim"),
-            (step.typed if step.given is not None else f"{step.typed} {reader.counts(Takes.DISTANCE)}", "strong"),
-            (f" = {other_way}" if other_way else "", "text"),
-        ]
-        jog = controls[BY]
-        minus, plus = (", ".join(self._filled(jog, axis, step.times(sign))) for sign in (-1, 1))
-        ready = self._jog.obstacle(glance.readout, axis, glance.state(), view.now)
-        head.append((f"   ↑↓ choose the step, l types it{other} ", "dim"))
-        rows: list[Row] = [
-            (*head, ("─" * max(0, width - width_of(head)), "rule")),
-            ((f" {fit('←', KEY)}", "key"), (fit(minus, WORD + LINE), "text"), (f"→  {plus}", "text")),
-            ((f" {fit('', KEY)}", "text"), self._readiness(ready)),
-            (("─ ", "rule"), ("move ", "dim"), ("─" * max(0, width - 7), "rule")),
-        ]
-        for key, entry in ENTRIES.items():
-            if entry.control:
-                rows.append(_control_row(key, entry.control, controls[entry.control], "…", width))
-        for key, name in KEYED.items():
-            rows.append(_control_row(key, name, controls[name], "", width))
-        return rows
-
-    def _readiness(self, why: str) -> Span:
-        """True if the next press moves, or why not; with the presses that were dropped."""
-        count = self._jog.dropped
-        presses = counted(count, "press", "presses")
-        dropped = f"; {presses} dropped ({'last: ' * (count > 1)}{self._jog.why})" if count else ""
-        if not why:
-            return f"ready{dropped}", "text" if dropped else "dim"
-        return f"a press is dropped now: {why}{dropped}", "motion" if why == "it moves" else "strong"
-
-    def _reader(self, glance: Glance, axis: Readout) -> AmountReader:
-        """Return what reads amounts for an axis of the selected drive."""
-        drive = self.host.session.selected
-        assert drive is not None
-        return AmountReader(self.host.session.units, drive, axis.axis, unit_of(axis, glance.unit))
+    def _paint_controls(self, view: View, width: int) -> None:
+        controls, chosen, asked = self._axis.controls(), self._axis.now(), self.asked
+        if chosen is None or not controls:
+            nothing = "^O chooses a drive" if chosen is None else NO_CONTROLS
+            self.lines("controls").put([((f" {nothing}", "dim"),)])
+            show_rows(self.lines("asked"), [])
+            return
+        glance, axis = chosen
+        reader = self._axis.reader()
+        why = readiness(self._jog, self._jog.obstacle(glance.readout, axis, glance.state(), view.now))
+        several = len(glance.readout.axes) > 1
+        rows = jog_rows(controls[BY], axis, reader, self._step(reader), several, why, width)
+        self.lines("controls").put([*rows, *control_rows(controls, width)])
+        entry = ENTRIES[asked.kind] if asked is not None else None
+        asks = [asked_row(entry, self.field.value, reader, controls.get(entry.control), axis, width)] if entry else []
+        show_rows(self.lines("asked"), asks)
 
     def _step(self, reader: AmountReader) -> Amount:
         """The length of a step for an axis. One that the axis cannot have becomes the first one again."""
@@ -262,82 +139,16 @@ class ControlsPage(SendingPage):
             self.step = FIRST_STEP
             return reader.read(FIRST_STEP, Takes.DISTANCE)
 
-    @staticmethod
-    def _filled(control: Control, axis: Readout, by: Amount) -> tuple[str, ...]:
-        """The lines of a move by a distance. Where they take a position, it is in the drive's own counts."""
-        to = axis.last.position + by.number if axis.last is not None else None
-        return control.filled(by=by.text, to="…" if to is None else to)
-
-    def _asked_rows(self, width: int) -> list[Row]:
-        """What is asked for, with what the entry would send; none while nothing is asked."""
-        asked, chosen = self.asked, self._chosen()
-        if asked is None or chosen is None:
-            return []
-        entry, (glance, axis) = ENTRIES[asked.kind], chosen
-        reader = self._reader(glance, axis)
-        label: list[Span] = [(f" {entry.what}: ", "strong"), (reader.asks(entry.takes), "dim")]
-        if self.field.value.strip():
-            try:
-                amount = self._read(entry, reader)
-            except Diagnostic as problem:
-                label.append((f"   {problem.message}", "motion"))
-            else:
-                label.append((f"   → {self._preview(entry, axis, amount)}", "strong"))
-                other = reader.other(amount, entry.takes)
-                label.append((f"  = {other}" if other else "", "strong"))
-        label.append(("   Enter; Esc ↑↓ Tab leave" if width_of(label) < width - 26 else "", "dim"))
-        return [tuple(label)]
-
-    def _preview(self, entry: Entry, axis: Readout, amount: Amount) -> str:
-        control = self._controls().get(entry.control)
-        if control is None:
-            return f"a step of {amount.typed}"
-        lines = self._filled(control, axis, amount) if entry.control == BY else control.filled(to=amount.text)
-        return ", ".join(lines)
-
-    def _read(self, entry: Entry, reader: AmountReader) -> Amount:
-        """Read the entry. Raises Diagnostic."""
-        amount = reader.read(self.field.value, entry.takes)
-        if not entry.control and amount.number <= 0:
-            raise Diagnostic(f"a step of {amount.typed} is no length", "", "type one above 0")
-        return amount
-
     # Keys
-
-    def _chosen(self) -> tuple[Glance, Readout] | None:
-        """The selected drive and its chosen axis, as they are now."""
-        glance = self._view.chosen if self._view is not None else None
-        if glance is None or self._place != self.host.session.place:
-            return None
-        axes = glance.readout.axes
-        return glance, axes[min(self._axis, len(axes) - 1)]
-
-    def _controls(self) -> Controls:
-        """The controls of the chosen axis. A drive that is not shown yet has its first axis: its stop does not wait."""
-        session = self.host.session
-        drive = session.selected
-        if drive is None:
-            return {}
-        chosen = self._chosen()
-        first = self.host.model.bus(session.selected_bus).readout(drive.address).axes[0]
-        return drive.family.values.controls(first.axis if chosen is None else chosen[1].axis)
-
-    def _nothing(self) -> str:
-        """Why a key other than the stop does nothing: there is no drive, or the person has not seen it yet."""
-        if self.host.session.selected is None:
-            return "no drive is selected"
-        return (
-            "" if self._chosen() is not None else "nothing was sent: the drive was not shown yet; press the key again"
-        )
 
     def action_step(self, by: int) -> None:
         if self._left():
             return
-        self.begun, chosen = None, self._chosen()
+        self.begun, chosen = None, self._axis.now()
         if chosen is None:
-            self.say(self._nothing())
+            self.say(self._axis.nothing())
             return
-        reader = self._reader(*chosen)
+        reader = self._axis.reader()
         before = self._step(reader)
         try:
             after = reader.read(before.level(by), Takes.DISTANCE)
@@ -358,33 +169,32 @@ class ControlsPage(SendingPage):
     def action_axis(self) -> None:
         if self._left():
             return
-        self.begun, chosen = None, self._chosen()
+        self.begun, chosen = None, self._axis.now()
         if chosen is None:
-            self.say(self._nothing())
-        elif len(axes := chosen[0].readout.axes) == 1:
+            self.say(self._axis.nothing())
+        elif len(chosen[0].readout.axes) == 1:
             self.say("it has one axis")
         else:
-            self._axis = (self._axis + 1) % len(axes)
             self._jog = Jog()
-            self.say(f"axis {axes[self._axis].axis} is chosen", "dim")
+            self.say(f"axis {self._axis.next().axis} is chosen", "dim")
 
     def action_jog(self, sign: int) -> None:
         """Move by one step, if the drive is known to rest; else drop the press."""
-        self.begun, chosen = None, self._chosen()
+        self.begun, chosen = None, self._axis.now()
         if chosen is None:
-            self.say(self._nothing())
+            self.say(self._axis.nothing())
         else:
-            self._move(BY, self._step(self._reader(*chosen)).times(sign))
+            self._move(BY, self._step(self._axis.reader()).times(sign))
 
     def action_do(self, key: str) -> None:
         """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
         name = KEYED[key]
-        control = self._controls().get(name)
+        control = self._axis.controls().get(name)
         self.begun, self._homing = None, False
         if name == STOP and control is not None and not control.absent:
             self.host.outbox.at_once(control.filled())
             self.say(f"sent: {', '.join(control.filled())}", "dim")
-        elif nothing := self._nothing():
+        elif nothing := self._axis.nothing():
             self.say(nothing)
         elif control is None or control.absent:
             self.say(f"no {WORDS[name]}: {control.absent}" if control is not None else NO_CONTROLS)
@@ -402,14 +212,14 @@ class ControlsPage(SendingPage):
             name = KEYED[begun.kind]
             if name in (HOME_MINUS, HOME_PLUS):
                 self._move(name, None)
-            elif (control := self._controls().get(name)) is not None:
+            elif (control := self._axis.controls().get(name)) is not None:
                 self.send(control.filled())
 
     def action_home(self) -> None:
         """Ask for the direction of a homing: one letter begins none."""
         self.action_drop()
-        self._homing = not self._nothing()
-        self.say(self._nothing() or "home: - or + is the direction   Esc: nothing")
+        self._homing = not self._axis.nothing()
+        self.say(self._axis.nothing() or "home: - or + is the direction   Esc: nothing")
 
     def action_toward(self, sign: str) -> None:
         if self._homing:
@@ -430,10 +240,10 @@ class ControlsPage(SendingPage):
 
     def action_ask(self, key: str) -> None:
         self.begun, self._homing = None, False
-        if not self._controls() or self._nothing():
-            self.say(self._nothing() or NO_CONTROLS)
+        if not self._axis.controls() or self._axis.nothing():
+            self.say(self._axis.nothing() or NO_CONTROLS)
             return
-        self._before = ""
+        self._before, self._void = "", False
         self.ask_for(key, "", "")
 
     def edited(self, text: str) -> None:
@@ -443,13 +253,13 @@ class ControlsPage(SendingPage):
             return  # pasted, or no blank
         if before.strip()[-1:].isdigit() and " " not in before and self._rests():
             return
-        self._before = before
+        self._before, self._void = before, True
         self.field.value = before
         self.action_do(SPACE)
 
     def _rests(self) -> bool:
         """Whether the chosen axis is known to rest."""
-        chosen, host = self._chosen(), self.host
+        chosen, host = self._axis.now(), self.host
         if chosen is None:
             return False
         glance, axis = chosen
@@ -458,13 +268,16 @@ class ControlsPage(SendingPage):
         return not self._jog.restless(glance.readout, axis, glance.state(), now)
 
     def typed(self, text: str) -> None:
-        asked, chosen = self.asked, self._chosen()
+        asked, chosen = self.asked, self._axis.now()
         if asked is None or chosen is None or asked.overtaken(self.host.session):
             self._close("the entry was not used")
             return
+        if self._void:
+            self._close("nothing was sent: Space has stopped the axis; type it again")
+            return
         entry = ENTRIES[asked.kind]
         try:
-            amount = self._read(entry, self._reader(*chosen))
+            amount = read(entry, text, self._axis.reader())
         except Diagnostic as problem:
             self.say(f"nothing was sent: {problem.message}; {problem.hint}".removesuffix("; "))
             return
@@ -477,9 +290,9 @@ class ControlsPage(SendingPage):
 
     def _move(self, name: str, amount: Amount | None) -> None:
         """Start a move, if the drive is known to rest; None: it takes no amount."""
-        chosen, control = self._chosen(), self._controls().get(name)
+        chosen, control = self._axis.now(), self._axis.controls().get(name)
         if chosen is None or control is None:
-            self.say(self._nothing() or NO_CONTROLS)
+            self.say(self._axis.nothing() or NO_CONTROLS)
             return
         glance, axis = chosen
         host, state = self.host, glance.state()
@@ -495,7 +308,8 @@ class ControlsPage(SendingPage):
         elif amount is None:
             self.send(control.filled())
         else:
-            self.send(self._filled(control, axis, amount) if name == BY else control.filled(to=amount.text))
+            entry = next(each for each in ENTRIES.values() if each.control == name)
+            self.send(moving_lines(entry, control, axis, amount))
 
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
@@ -510,17 +324,3 @@ class ControlsPage(SendingPage):
         self.end_asking()
         if said:
             self.say(said)
-
-
-def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:
-    """Key, word, lines and meaning of a control; an absent one has its reason."""
-    shown = "Space" if key == SPACE else key if number else f"{'h' if key in '+-' else ''}{key} Enter"
-    if control.absent:
-        text = fit(f"not here: {control.absent}", max(0, width - KEY - WORD - 3))
-        return ((f" {fit('', KEY)}", "dim"), (f"{fit(WORDS[name], WORD)} ", "dim"), (text, "dim"))
-    row: list[Span] = [
-        (f" {fit(shown, KEY)}", "key"),
-        (f"{fit(WORDS[name], WORD)} ", "text"),
-        (fit(control.shown(by=number, to=number), LINE), "strong"),
-    ]
-    return (*row, (fit(control.about, max(0, width - KEY - WORD - LINE - 3)), "dim"))
