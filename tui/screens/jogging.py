@@ -1,4 +1,4 @@
-"""Which presses of a jog key count: one press is one bounded move, and it counts only while the axis is known to rest.
+"""The presses of a jog key that move: one press is one bounded move, and only while the axis is known to rest.
 
 A terminal sends no key-up, and repeats a held key. A reading that is newer than the last line says that the axis rests.
 """
