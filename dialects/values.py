@@ -17,7 +17,7 @@ from typing import ClassVar
 from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.text import real
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.controls import NAMES, Control, Controls
+from multidrop.dialects.controls import NAMES, UNKNOWN, Control, Controls, Homing
 from multidrop.dialects.state import OfDrive, who
 
 # Settings, and the steps that change them
@@ -470,7 +470,12 @@ class Values(OfDrive):
 
     def controls(self, axis: str) -> Controls:
         """The controls of an axis."""
-        return {name: Control(absent="such drives have no line for it, as far as is known") for name in NAMES}
+        return {name: Control(absent=UNKNOWN) for name in NAMES}
+
+    def homings(self, axis: str) -> Sequence[Homing]:
+        """Every way to home an axis, the usual one first."""
+        modes = self.actions.homings(axis).items()
+        return [Homing(mode, sign, (line,)) for mode, lines in modes for sign, line in lines.items()]
 
     def own(self, word: str) -> bool:
         """Whether a checked word belongs to the language; any other would be a name that a person gave."""
