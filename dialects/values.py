@@ -16,6 +16,7 @@ from typing import ClassVar
 
 from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.text import real
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.controls import NAMES, Control, Controls
 from multidrop.dialects.state import OfDrive, who
@@ -441,6 +442,11 @@ class Values(OfDrive):
     def actions(self) -> Actions:
         """What a program asks of it."""
         return Actions(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        """What a person edits and switches of it besides its settings."""
+        return ByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         """Read everything of a drive that a cell file needs. Raises Refused, NoAnswer or Inexpressible."""

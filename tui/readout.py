@@ -10,6 +10,7 @@ from enum import Enum
 from itertools import takewhile
 from typing import NamedTuple
 
+from multidrop.dialects.by_hand import Variable
 from multidrop.dialects.values import Conditions, Pace, Readings
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
@@ -177,6 +178,9 @@ class Readout:
     settings: Readings | None = None
     """Every setting, as last read in this session."""
     settings_at: float = -math.inf
+    variables: tuple[Variable, ...] | None = None
+    """The variables of its programs, as last read in this session."""
+    variables_at: float = -math.inf
     twin: TwinReadout | None = None
     """The twin of this axis; None: none runs."""
     figures: Figures = NATIVE

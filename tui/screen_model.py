@@ -337,6 +337,10 @@ class ScreenModel:
             case events.SettingsRead():
                 readout = self.bus(event.bus).readout(event.address)
                 readout.settings, readout.settings_at = event.readings if event.known else None, event.at
+                readout.variables = readout.variables if event.known else None
+            case events.VariablesRead():
+                readout = self.bus(event.bus).readout(event.address)
+                readout.variables, readout.variables_at = event.variables, event.at
 
     def quiet(self, event: events.SessionEvent) -> bool:
         """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""

@@ -354,6 +354,7 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry("program", "Program", "edit, check, download, run, trace and step", "program:ProgramPage"),
     PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", "parameters:ParametersPage"),
     PageEntry("setup", "Set-up", "name, unit, travel, zero and guard of a drive, as a form", "setup:SetupPage"),
+    PageEntry("variables", "Variables", "the variables of the programs as a table to edit", "variables:VariablesPage"),
     PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", "controls:ControlsPage"),
     PageEntry("why", "Why", "what is wrong with the selected drive, and three keys that help", "why:WhyPage"),
     PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", "traffic:TrafficPage"),

@@ -18,6 +18,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.controls import Controls, controls_of
 from multidrop.dialects.listed_settings import ListedParameters
@@ -299,6 +300,12 @@ class PmxValues(Values):
     @property
     def parameters(self) -> Parameters:
         return PmxParameters(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        from multidrop.families.pmx.host.by_hand import PmxByHand
+
+        return PmxByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         readings = yield from PmxParameters(self.state).read(progress)
