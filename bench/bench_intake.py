@@ -51,6 +51,8 @@ class Program:
     ready: bytes
     piped: bool = False
     needs: str = ""
+    size: tuple[int, int] = (120, 40)
+    """Columns and rows of its terminal."""
 
 
 OURS = (
@@ -254,7 +256,8 @@ def opened(program: Program) -> Iterator[tuple[Line, Terminal | Piped]]:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         line = Line(stack.enter_context(served(CELL))[1])
         stack.callback(line.close)
-        shown = (Piped if program.piped else Terminal)(program.command(line.port), folder)
+        command = program.command(line.port)
+        shown = Piped(command, folder) if program.piped else Terminal(command, folder, program.size)
         stack.callback(shown.end)
         shown.until(program.ready)
         time.sleep(1.0)

@@ -39,9 +39,9 @@ def multidrop(*arguments: str) -> list[str]:
 
 
 class Terminal:
-    """A terminal of 120 x 40 that reads everything at once and answers cursor queries."""
+    """A terminal that reads everything at once and answers cursor queries. `size`: its columns and rows."""
 
-    def __init__(self, command: Sequence[str], folder: Path) -> None:
+    def __init__(self, command: Sequence[str], folder: Path, size: tuple[int, int] = (120, 40)) -> None:
         self.shown = bytearray()
         """The end of the output."""
         self.count = 0
@@ -51,7 +51,7 @@ class Terminal:
             os.chdir(folder)
             os.execvpe(command[0], list(command), environment(folder))
         self.pid = pid
-        fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
+        fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", *reversed(size), 0, 0))
         self._ended = False
         self._sought = b""
         self._found_at: float | None = None

@@ -27,11 +27,11 @@ from textual.message import Message
 from textual.screen import Screen
 
 from multidrop.base.errors import Diagnostic
-from multidrop.drives.events import Unsolicited
+from multidrop.drives.events import Sample, Unsolicited, Valued
 from multidrop.shell.broken_configuration import placed, placed_in_file
 from multidrop.shell.configuration import DEFAULT_SCREEN, ScreenSettings, Settings, parse
 from multidrop.shell.connect.urls import wrong_urls
-from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.shell.events import Failed, OnBus, Predicted, Printed, SessionEvent, StateChanged
 from multidrop.shell.sections import sections
 from multidrop.shell.session import Session
 from multidrop.tui.actions import ScreenActions, ScreenParts
@@ -211,7 +211,11 @@ class MultidropApp(Dressed):
         if stopped:  # first: a defect in what is shown must not leave it for a later event, with what was typed since
             self._drop_typed()
         if not self.model.quiet(event):
-            self.frames.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
+            inner = event.event if isinstance(event, OnBus) else None
+            if isinstance(inner, Sample | Valued | Predicted):
+                self.frames.follow()
+            else:
+                self.frames.wake(panels=not isinstance(inner, Unsolicited))
         if stopped:
             self.model.stopped(self.session.now())
         elif isinstance(event, StateChanged) and self.selection.changed:

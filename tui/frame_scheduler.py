@@ -1,6 +1,7 @@
 """When a frame is painted: soon after something happened, thirty times a second at most, and at the terminal's pace.
 
-Frames come in beats. One of three paints all; the others paint new records only. While nothing happens, a frame is
+Frames come in beats. One of three paints all; the others paint new records only. Values that change while no record
+comes are painted ten times a second: no frame is begun that would show nothing new. While nothing happens, a frame is
 painted now and then for the clock and the ages of values.
 
 A frame goes out once the terminal has swallowed the one before. After each frame the terminal is asked for its cursor
@@ -17,6 +18,10 @@ FRAMES = 30
 """Paints a second, at most."""
 PANELS = 3
 """Frames of which one paints all."""
+PACE = PANELS / FRAMES
+"""Seconds between two paints of all, at least."""
+EARLY = 0.005
+"""Seconds by which a timer may end early."""
 AGEING = 1.0
 """Seconds between two paints while nothing happens."""
 
@@ -33,11 +38,14 @@ class Frames:
     ) -> None:
         self._paint, self._later, self._behind = paint, later, behind
         self._beat = 0
+        self._timer: asyncio.TimerHandle | None = None
+        """Begins the next frame."""
         self._due = False
-        """A frame is about to be painted."""
+        """A frame is in the app's queue."""
         self._panels_owed = False
         """More than records has changed since all was painted."""
-        self._painted_at = 0.0
+        self._painted_at = self._all_at = 0.0
+        """When the last frame was painted, and the last one that painted all."""
         self._hurried = False
         """The reply to a typed line was painted early since the last frame."""
         self._owed = False
@@ -46,11 +54,26 @@ class Frames:
     def wake(self, panels: bool = True) -> None:
         """Paint soon: something has happened. `panels`: it may be more than a record."""
         self._panels_owed = self._panels_owed or panels
-        if not self._due:
-            self._due = True
-            loop = asyncio.get_running_loop()
-            delay = max(0.0, self._painted_at + 1 / FRAMES - loop.time())
-            loop.call_later(delay, self._later, self._frame)
+        self._begin_at(self._painted_at + 1 / FRAMES)
+
+    def follow(self) -> None:
+        """Paint values that have changed, with the next frame that paints all: nothing else has come."""
+        self._panels_owed = True
+        self._begin_at(self._all_at + PACE)
+
+    def _begin_at(self, when: float) -> None:
+        """Begin a frame at a time, unless one is begun before it."""
+        loop = asyncio.get_running_loop()
+        when = max(when, loop.time())
+        if self._due or (self._timer is not None and self._timer.when() <= when):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = loop.call_at(when, self._begin)
+
+    def _begin(self) -> None:
+        self._timer, self._due = None, True
+        self._later(self._frame)
 
     def age(self) -> None:
         """Paint what changes by itself, unless a frame was painted just now."""
@@ -69,8 +92,11 @@ class Frames:
 
     def tick(self) -> bool:
         """Paint one beat; return whether the terminal takes it."""
-        if not self._paint(self._beat % PANELS == PANELS - 1):
+        every = self._beat % PANELS == PANELS - 1
+        if not self._paint(every):
             return False
+        if every:
+            self._all_at = asyncio.get_running_loop().time()
         self._beat += 1
         return True
 
@@ -83,14 +109,16 @@ class Frames:
         """Paint a frame, and another one until all is painted that has come."""
         self._due = self._hurried = self._owed = False
         now = asyncio.get_running_loop().time()
-        if now - self._painted_at >= PANELS / FRAMES:  # the first for a while shows all
+        if now - self._all_at >= PACE - EARLY:  # the first for a while shows all
             self._beat += (PANELS - 1 - self._beat) % PANELS
         self._painted_at = now
         painted = self.tick()
         if painted and self._beat % PANELS == 0:
             self._panels_owed = False
-        if not painted or self._panels_owed or self._behind():
+        if not painted or self._behind():
             self.wake(panels=False)
+        elif self._panels_owed:
+            self.follow()
 
     def _hurry(self) -> None:
         self._owed = not self.tick()

@@ -1,7 +1,8 @@
 """The drives to poll and their periods: exactly what is on the screen.
 
 The selected drive is polled at the rate of its display while it moves and after a line was sent to it, at rest twice a
-second. What is plotted is polled faster. The others have only a sign on their tabs: they are polled every two seconds,
+second. A plotted drive is polled as often as the plot can show: once for each column of dots. The page of plots and a
+trigger read it as fast as people measure. The others have only a sign on their tabs: they are polled every two seconds,
 and more often while they move. If polling is off, nothing is polled, and the screen says so.
 """
 
@@ -19,7 +20,7 @@ from multidrop.tui.curves.trigger import TriggerState
 from multidrop.tui.screen_model import ScreenModel
 
 PLOT = 0.02
-"""Seconds between the samples of a plotted drive; a slow wire gives fewer."""
+"""Least seconds between the samples of a plotted drive; a slow wire gives fewer."""
 VALUES = 0.1
 """Seconds between two readings of a plotted value."""
 STATUS = 0.05
@@ -54,8 +55,12 @@ class Polling:
 
     def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
-        chosen = list(dict.fromkeys([*(plotted(session) if "plot" in wants else []), *_awaited(session, model)]))
-        drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST_PERIOD) if self.on else {}
+        shown, awaited = plotted(session) if "plot" in wants else [], _awaited(session, model)
+        chosen = list(dict.fromkeys([*shown, *awaited]))
+        measured = chosen if "samples" in wants else awaited
+        drives = (
+            _drives(session, model, shown, measured, PLOT if "samples" in wants else REST_PERIOD) if self.on else {}
+        )
         watches = _watches(session, plotted(session)) if self.on else {}
         values = _values(session, chosen) if self.on else {}
         for (bus, _, addresses), period in drives.items():
@@ -112,22 +117,32 @@ def _open(session: Session) -> list[Bus]:
     return [bus for bus in session.tabs.shown if bus.lost is None]
 
 
-def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted:
-    """The periods of drives; `rest` is that of plotted drives that stand still."""
+def _drives(
+    session: Session, model: ScreenModel, shown: Sequence[Series], measured: Sequence[Series], rest: float
+) -> Wanted:
+    """The periods of drives: of those that a plot shows, and of those that a person measures in one.
+
+    `rest` is the period of measured drives that are at rest.
+    """
     wanted: Wanted = {}
     for bus in _open(session):
         chosen = session.selected.address if bus.name == session.selected_bus and session.selected is not None else None
-        fast = {series.address for series in plotted if series.bus == bus.name and series.of_motion}
+        drawn, fast = _motions(bus, shown), _motions(bus, measured)
         by_period: dict[float, list[str]] = {}
         for address in bus.drives:
             busy = model.bus(bus.name).readout(address).busy(session.now())
-            shown = address == chosen or address in fast
-            moving = PLOT if address in fast else STATUS if address == chosen else LIVELY
-            still = rest if address in fast else REST_PERIOD if shown else OTHERS_PERIOD
+            usual = STATUS if address == chosen else LIVELY
+            moving = PLOT if address in fast else min(usual, max(PLOT, model.look.dot)) if address in drawn else usual
+            still = rest if address in fast else REST_PERIOD if address in drawn | {chosen} else OTHERS_PERIOD
             by_period.setdefault(moving if busy else still, []).append(address)
         for period, addresses in by_period.items():
             wanted[bus.name, id(bus), tuple(addresses)] = period
     return wanted
+
+
+def _motions(bus: Bus, series: Sequence[Series]) -> set[str]:
+    """The drives of a bus that have their motion among these series."""
+    return {each.address for each in series if each.bus == bus.name and each.of_motion}
 
 
 def _watches(session: Session, plotted: Sequence[Series]) -> Wanted:

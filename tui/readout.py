@@ -185,6 +185,8 @@ class Readout:
     """The twin of this axis; None: none runs."""
     figures: Figures = NATIVE
     """The form in which its numbers are shown."""
+    sparks: dict[object, tuple[object, str]] = field(default_factory=dict)
+    """The small curves that were drawn last, by what each shows, and the time of each."""
 
     @property
     def axes(self) -> list[Readout]:

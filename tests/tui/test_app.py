@@ -10,6 +10,7 @@ from textual.worker import WorkerFailed
 from multidrop.base.errors import TransportLost
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.shell.events import By, Entered, OnBus, StateChanged
+from multidrop.shell.roles import Series
 from multidrop.tui.outbox import BURST
 from multidrop.tui.polling import LIVELY, OTHERS_PERIOD, PLOT, REST_PERIOD, STATUS
 from multidrop.tui.readout import ReadoutState
@@ -258,7 +259,7 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         assert (eth.polled, pmx.polled) == ({"": OTHERS_PERIOD}, {}), "a lost bus is not polled"
         await pilot.press("ctrl+g", "ctrl+g")
         await emit(pilot, OnBus("press", Sample(session.time, "a", 5, 7)))
-        assert press.polled["a"] == PLOT
+        assert press.polled["a"] == STATUS, "a column of dots of 20 s takes longer"
         await pilot.press("ctrl+g", "ctrl+g")
         await settle(pilot)
         assert press.polled["a"] == STATUS
@@ -267,6 +268,29 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         assert press.polled == eth.polled == {}
         app.act.action_polling()
     assert press.polled == eth.polled == {}, "nothing is polled for a screen that is gone"
+
+
+async def test_a_plotted_drive_is_read_once_for_each_column_of_dots_and_on_the_page_for_measuring() -> None:
+    session = demo_session()
+    app = make_app(session)
+    polled = session.buses["press"].telemetry
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.plotted = (Series("press", "a"), Series("press", "b"))
+        await pilot.press("ctrl+g", "ctrl+g")
+        await emit(pilot, *(OnBus("press", Sample(session.time, address, 5, 7)) for address in "ab"))
+        assert (polled.polled["a"], round(polled.polled["b"], 3)) == (STATUS, 0.147), (
+            "140 columns of dots for some 20 s"
+        )
+        app.model.look.shorter(2)
+        await settle(pilot)
+        assert (round(polled.polled["a"], 3), round(polled.polled["b"], 3)) == (0.036, 0.036), "and for 5 s"
+        app.model.look.shorter(1)
+        await settle(pilot)
+        assert polled.polled["a"] == polled.polled["b"] == PLOT, "2 s have finer columns than a person needs"
+        app.model.look.automatic()
+        await pilot.press("ctrl+g")
+        await settle(pilot)
+        assert polled.polled["a"] == polled.polled["b"] == PLOT
 
 
 async def test_a_drive_that_was_sent_a_line_or_moves_is_looked_at_more_often() -> None:

@@ -1,8 +1,10 @@
-"""The pace of frames in virtual time: terminals that reply, that never do, that cease to, that reply late."""
+"""The pace of frames in virtual time: what moves, lines; terminals that reply, never do, cease to, or reply late."""
+
+import asyncio
 
 import pytest
 
-from multidrop.tui.frame_scheduler import MOST_UNANSWERED, REPLY_TIMEOUT, TerminalPace
+from multidrop.tui.frame_scheduler import MOST_UNANSWERED, REPLY_TIMEOUT, Frames, TerminalPace
 
 
 class Screen:
@@ -76,3 +78,66 @@ def test_an_answer_that_comes_late_brings_the_waiting_back(screen):
     screen.pace.answered()
     assert screen.frame() is True
     assert screen.frame() is None
+
+
+class Painted:
+    """Frames that are painted at once, and what each of them was."""
+
+    def __init__(self):
+        self.frames = Frames(self.paint, self.later, lambda: False)
+        self.times: list[tuple[int, str]] = []
+        """Milliseconds, and `all` or `records`."""
+        self.begin = asyncio.get_running_loop().time()
+
+    @staticmethod
+    def later(run):
+        asyncio.get_running_loop().call_soon(run)
+        return True
+
+    def paint(self, panels):
+        now = asyncio.get_running_loop().time() - self.begin
+        self.times.append((round(1000 * now), "all" if panels else "records"))
+        return True
+
+
+@pytest.mark.virtual
+async def test_values_that_change_are_painted_ten_times_a_second_however_often_they_are_read():
+    for period in (0.02, 0.05):
+        painted = Painted()
+        for _ in range(round(2 / period)):
+            painted.frames.follow()
+            await asyncio.sleep(period)
+        assert {what for _, what in painted.times} == {"all"}
+        assert 19 <= len(painted.times) <= 21
+
+
+@pytest.mark.virtual
+async def test_the_first_value_after_a_rest_is_painted_at_once():
+    painted = Painted()
+    await asyncio.sleep(5)
+    painted.frames.follow()
+    await asyncio.sleep(0.5)
+    assert painted.times == [(5000, "all")]
+
+
+@pytest.mark.virtual
+async def test_a_line_waits_for_no_value_and_values_wait_for_no_line():
+    painted = Painted()
+    await asyncio.sleep(5)
+    painted.frames.follow()
+    await asyncio.sleep(0.02)
+    painted.frames.follow()
+    await asyncio.sleep(0.02)
+    painted.frames.wake(panels=False)
+    await asyncio.sleep(0.5)
+    assert painted.times == [(5000, "all"), (5040, "records"), (5100, "all")]
+
+
+@pytest.mark.virtual
+async def test_lines_are_painted_thirty_times_a_second_and_all_with_every_third():
+    painted = Painted()
+    for _ in range(200):
+        painted.frames.wake()
+        await asyncio.sleep(0.005)
+    assert 28 <= len(painted.times) <= 32
+    assert 9 <= [what for _, what in painted.times].count("all") <= 11

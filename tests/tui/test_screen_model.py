@@ -8,7 +8,17 @@ import pytest
 
 from multidrop.dialects import End, Priority, Reply
 from multidrop.dialects.values import Conditions
-from multidrop.drives.events import Conditioned, Ended, Sample, Sent, Silent, Traffic, Transaction, Unsolicited
+from multidrop.drives.events import (
+    Conditioned,
+    Ended,
+    Rested,
+    Sample,
+    Sent,
+    Silent,
+    Traffic,
+    Transaction,
+    Unsolicited,
+)
 from multidrop.families.lexium.host.mcode.codec import MCode
 from multidrop.shell.events import (
     Agreed,
@@ -358,3 +368,28 @@ def test_the_gutter_has_the_name_that_a_person_gave_and_a_failure_does_not_repea
         ("a", "gantry", "no reply"),
         ("a", "gantry", "0"),
     ]
+
+
+def rested(at: float, name: str, *places: tuple[str, int], stop: int = 0, drives: int = 3) -> Notified:
+    text = f"press: {name}: stopped, velocity 0 at {places}"
+    return Notified(at, text, "press", address=name, rested=Rested(stop, drives, name, places))
+
+
+def test_the_drives_of_one_stop_are_one_record_with_the_place_of_each(model: ScreenModel) -> None:
+    model.take(rested(1.0, "a", ("", 5)))
+    model.take(rested(1.1, "b", ("x", 6), ("y", -7)))
+    (record,) = model.bus("press").fresh
+    assert record.text == "press: 2 of 3 at rest   a 5   b x 6, y -7"
+    assert record.details == ("a 5", "b x 6, y -7")
+    model.bus("press").fresh.clear()  # a transcript has taken it
+    model.take(rested(1.2, "c", ("", 8)))
+    (later,) = model.bus("press").fresh
+    assert later.joins == record.joins and later.text.startswith("press: 3 of 3 at rest")
+
+
+def test_a_later_stop_is_a_record_of_its_own_and_a_stop_of_one_drive_keeps_its_words(model: ScreenModel) -> None:
+    model.take(rested(1.0, "a", ("", 5)))
+    model.take(rested(2.0, "a", ("", 5), stop=1))
+    model.take(rested(3.0, "a", ("", 5), stop=2, drives=1))
+    texts = [record.text for record in model.bus("press").fresh]
+    assert texts == ["press: 1 of 3 at rest   a 5"] * 2 + ["press: a: stopped, velocity 0 at (('', 5),)"]

@@ -10,6 +10,7 @@ from textual.pilot import Pilot
 from multidrop.shell.raw import ByteForm
 from multidrop.tui.screen_model import MOST_FRESH_RECORDS, Record
 from multidrop.tui.widgets.transcript import Clocks, Transcript, rows_of
+from multidrop.tui.widgets.viewport import Picked
 
 pytestmark = pytest.mark.tui
 GUTTER = Clocks("clock", str).gutter
@@ -193,3 +194,17 @@ async def test_raw_bytes_stand_in_columns_with_milliseconds_and_the_gutter_is_as
     assert page.clocks.gutter == clocks.gutter + len("gantry-left") - 3
     (row,) = page.rows_of(page.records[0], None, 60)
     assert "".join(text for text, _ in row) == " 12:41:05  gantry-left › PR P"
+
+
+async def test_a_record_with_details_has_one_row_until_it_is_picked() -> None:
+    drives = tuple(f"drive{n} {n}.000 mm" for n in range(12))
+    stop = Record(1.0, "", "■", "   ".join(("press: 12 of 12 at rest", *drives)), details=drives)
+    app = Reader()
+    async with app.run_test(size=(60, 20)) as pilot:
+        app.page.extend([Record(0.5, "", ".", "before"), stop])
+        rows = [row for row in await shown(pilot, app.page) if row]
+        assert len(rows) == 2 and "■ press: 12 of 12 at rest   drive0 0.000 mm" in rows[1] and rows[1].endswith("…")
+        app.page.picked = Picked(app.page.sight)
+        app.page.changed()
+        rows = [row for row in await shown(pilot, app.page) if row]
+        assert len(rows) == 14 and rows[-1].endswith("drive11 11.000 mm")

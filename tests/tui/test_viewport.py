@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from multidrop.shell.roles import EVERYTHING, Filter
 from multidrop.tui.screen_model import Record
-from multidrop.tui.widgets.viewport import Index, Picked, RecordFilter, Records, RecordSearch, VisibleRecords
+from multidrop.tui.widgets.viewport import (
+    MOST_BETWEEN,
+    Index,
+    Picked,
+    RecordFilter,
+    Records,
+    RecordSearch,
+    VisibleRecords,
+)
 from tests.support.cases import for_each
 
 TALK = [
@@ -166,3 +174,13 @@ def test_nothing_is_picked_of_an_empty_transcript() -> None:
     picked = Picked(sight)
     picked.move(-1, extend=True)
     assert picked.records == []
+
+
+def test_a_record_replaces_the_earlier_one_that_it_joins_and_only_among_the_last_ones() -> None:
+    records = Records()
+    first = Record(1.0, "", "■", "1 of 2", joins=7)
+    assert records.take([first, Record(1.1, "", ".", "between")]) == []
+    assert records.take([first._replace(text="2 of 2")]) == [0]
+    assert [record.text for record in records] == ["2 of 2", "between"] and records.taken == 2
+    records.take([Record(2.0, "", ".", "later")] * MOST_BETWEEN)
+    assert records.take([first._replace(text="again")]) == [] and records[records.taken - 1].text == "again"

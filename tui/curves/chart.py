@@ -151,6 +151,8 @@ class ChartView:
         """The words whose plots are hidden."""
         self.charts: dict[tuple[str, str, int], Chart] = {}
         """The charts that were drawn, by word, drive and width."""
+        self.dot = 0.0
+        """Seconds of a column of dots in the last picture."""
         self.numbers: dict[tuple[str, str, str], int] = {}
         """The number of the colour of each axis that is plotted."""
 
@@ -161,6 +163,7 @@ class ChartView:
     def window(self, now: float, columns: int, wide: int) -> ColumnWindow:
         end = now if self.paused_at is None else self.paused_at
         step, cell = self.cells(columns)
+        self.dot = cell / wide
         return ColumnWindow(cell * columns, floor(end / cell) - columns + 1, columns, wide, step)
 
     def cells(self, columns: int) -> tuple[float, float]:

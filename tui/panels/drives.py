@@ -6,9 +6,8 @@ Columns are fixed and numbers are right-aligned, so that nothing jumps while val
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from operator import attrgetter
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.line_syntax import join_target
@@ -29,20 +28,35 @@ from multidrop.tui.panels.drive import (
     trouble_of,
 )
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
-from multidrop.tui.readout import READ, SPAN, PlottedPoint, Readout, ReadoutState
+from multidrop.tui.readout import READ, SPAN, Readout, ReadoutState
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import ActionText, Row, Span, spread, width_of
 
+MOST_SPARKS = 8
+"""Small curves that are kept of a drive."""
 
-def spark(
-    readout: Readout, now: float, width: int, value: Callable[[PlottedPoint], int] = attrgetter("position")
-) -> str:
-    """Draw a value of the first axis; a resting drive is a line at the foot, and what was not read stays empty."""
+
+def spark(readout: Readout, now: float, width: int, value: str = "position") -> str:
+    """Draw a value of the first axis; a resting drive is a line at the foot, and what was not read stays empty.
+
+    `value` names a field of `PlottedPoint`. The curve is drawn once for each column of dots that time or samples reach,
+    not for each sample in it.
+    """
     if not readout.points or width < 1:
         return " " * max(0, width)
+    dot, shown = SPAN / (2 * width), (value, width)
+    reached = (now // dot, readout.points[-1].at // dot, readout.silent_since, readout.period, len(readout.points) > 2)
+    if shown not in readout.sparks or readout.sparks[shown][0] != reached:
+        if len(readout.sparks) >= MOST_SPARKS:
+            readout.sparks.clear()
+        readout.sparks[shown] = reached, _drawn(readout, now, width, value)
+    return readout.sparks[shown][1]
+
+
+def _drawn(readout: Readout, now: float, width: int, value: str) -> str:
     trace = Trace()
     for point in readout.points:
-        trace.add(point.at, value(point))
+        trace.add(point.at, getattr(point, value))
     low, high = min(trace.values), max(trace.values)
     if readout.silent_since is None and now - trace.at[-1] < 3 * max(readout.period, 1.0):
         trace.add(now, trace.values[-1])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from operator import attrgetter
 
 from multidrop.base.errors import Diagnostic
 from multidrop.drives.drive import Drive
@@ -89,7 +88,7 @@ class WhyPage(SendingPage):
             return [head, *plot_rows(view, width, height - 1)]
         rows: list[Row] = [head]
         for name in ("position", "velocity"):
-            drawn = spark(glance.readout, view.now, width - LABEL - 1, attrgetter(name))
+            drawn = spark(glance.readout, view.now, width - LABEL - 1, name)
             rows.append(((f" {name:<{LABEL}}", "dim"), (drawn, "accent")))
         return rows
 
