@@ -1,8 +1,8 @@
 """The one table of keys: what each page and box is for, its keys, and what they do there.
 
 Bindings, footers, the keys named in boxes, F1 and the table in docs/screen.md are made from it, so none of them can
-name a key that does nothing. A key has one word, the same wherever it works (docs/decisions/0099); its line says what
-that is here.
+name a key that does nothing. A key does one kind of thing wherever it works; each page has its own word for that
+(docs/decisions/0099).
 
 To add a key, add a row to `keys.csv`, and its action to the page. A sheet is a row of `sheets.csv`. Features add
 `shell.hooks.Switch`es.
@@ -96,7 +96,7 @@ class KeySheet(NamedTuple):
     below: Sequence[str]
     """The sheets whose keys work here, too."""
     foot: Sequence[str]
-    """The words of the footer in order; `*` stands for those of its own keys."""
+    """The words of the footer in order, the most important first; `*` stands for those of its other keys."""
 
     @property
     def keys(self) -> list[Key]:
@@ -175,13 +175,14 @@ def below(name: str) -> list[str]:
 
 
 def footer(name: str) -> list[Key]:
-    """The keys in the footer of a sheet, in order."""
+    """Return the keys in the footer of a sheet, the most important first."""
     sheet = SHEETS[name]
     own = [key for key in sheet.keys if key.word and key.keys]
-    others = [key for each in below(name) for key in SHEETS[each].keys]
+    every = [*own, *(key for each in below(name) for key in SHEETS[each].keys)]
     keys: list[Key] = []
     for word in sheet.foot:
-        keys += own if word == "*" else [key for key in others if key.word == word][:1]
+        rest = [key for key in own if key.word not in sheet.foot]
+        keys += rest if word == "*" else [key for key in every if key.word == word and key.keys][:1]
     return keys
 
 

@@ -156,14 +156,16 @@ class Presenter:
         width = screen.size.width
         keys = footer(screen.SHEET)
         shown = [(self.keymap.shown(key.name) if key.name else key.shown, key.word) for key in keys]
-        first = [(self.keymap.shown("help"), "help")]
+        first: list[tuple[str, str]] = []
         plays = isinstance(screen, MainScreen)
         if plays and self.macros.place:
-            first.append((self.keymap.shown("macro-page"), self.macros.place))
+            key = self.keymap.shown("macro-page") or self.keymap.shown("page-macros")
+            first.append((key, self.macros.place))
         for key, name in self.macros.shown if plays else ():  # a person may have given it another key
             first.append((self.keymap.shown(f"play-{key.lower()}") or key, name))
         recording, latched = bool(self.session.recording), self.session.latched and self.purpose.works
-        return footer_row([*first, *shown], recording, latched, width, self.model.progress)
+        help_ = self.keymap.shown("help")
+        return footer_row([*first, *shown], recording, latched, width, self.model.progress, help_)
 
     def _paint_panels(self, main: MainScreen, view: View) -> None:
         """Paint the columns beside the transcript, or the panel and the status lines below it."""

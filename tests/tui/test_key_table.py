@@ -16,11 +16,12 @@ from multidrop.shell.channel import AskedValue
 from multidrop.tui import palette
 from multidrop.tui.actions import ScreenActions
 from multidrop.tui.app import MultidropApp, bindings
-from multidrop.tui.key_table import SHEETS, all_groups
+from multidrop.tui.key_table import SHEETS, all_groups, footer
 from multidrop.tui.keymap import keymap
 from multidrop.tui.screens.dialogs import InputField
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import PAGES
+from multidrop.tui.widgets.bars import STOP, footer_row
 from tests.support import key_docs
 from tests.support.fake_session import FakeSession, a_move, a_talk, binding_of, demo_session, make_app, settle
 
@@ -39,13 +40,78 @@ def test_the_table_in_the_documentation_is_the_table_of_the_program() -> None:
     assert key_docs.written(page) == page, "python -m tests.support.key_docs writes it anew"
 
 
-def test_a_letter_and_a_key_with_ctrl_have_the_same_word_wherever_they_work() -> None:
+KINDS = {
+    "^B, Ins": {"hold", "break", "end", "raw", "backup"},  # hold, end or keep
+    "^D": {"traffic", "download"},
+    "^E": {"program", "open", "edit"},  # a text in the editor
+    "^F": {"find", "next error", "compare", "find drives"},  # find
+    "^K": {"macros", "key"},
+    "^R": {"lines before", "run", "restore"},  # lines to send
+    "^T": {"step", "times"},
+}
+"""The keys that have several words, each of one page."""
+
+
+def test_a_letter_and_a_key_with_ctrl_do_one_kind_of_thing_wherever_they_work() -> None:
     words: dict[str, set[str]] = defaultdict(set)
     for sheet in SHEETS.values():
         for each in sheet.keys:
             if each.word and key_docs.kind(each) != "other":
                 words[key_docs.spelled(each)].add(each.word)
-    assert {keys: found for keys, found in words.items() if len(found) > 1} == {}
+    assert {keys: found for keys, found in words.items() if len(found) > 1} == KINDS
+
+
+def footer_of(name: str, width: int) -> str:
+    keys = [(key.shown, key.word) for key in footer(name)]
+    row = footer_row(keys, False, False, width, "", "F1")
+    return "".join(text for text, _ in row).strip()
+
+
+FOOTERS_80 = {
+    "main": "F1 help  ^P everything  ^Y why  ^O drive  ^A all drives",
+    "setup": "Enter edit  ^S save  ↑↓ choose  Tab axis  Esc back  F1 help",
+    "drives": "Enter select  Esc back  ^Y why  ^N controls  ^O drive  F1 help",
+    "why": "r read error  t traffic  ^N controls  ^E program  Esc back  F1",
+    "plot": "Space hold  g trigger  ←→ cursor  +- time  Esc back  F1 help",
+    "macros": "Enter play  ^B end  ^E edit  ^K key  ^T times  Del delete  F1",
+    "program": "^D download  ^R run  ^B break  ^F next error  ^E open  F1 help",
+    "parameters": "Enter edit  ^S save  ^F compare  ^R restore  ^B backup  F1",
+    "controls": "←→ jog  m move to  h home  Space stop  e enable  d disable  F1",
+    "traffic": "Space hold  ↑↓ look back  End follow  i its polls  f form  F1",
+}
+MORE_AT_120 = {
+    "main": "^N controls  ^G plots  ^E program",
+    "setup": "^P everything",
+    "drives": "^P everything",
+    "why": "^P everything",
+    "plot": "↑↓ values  x cursor 2",
+    "macros": "Esc back  Tab key page  ^P everything",
+    "program": "^S save  ^T step  Esc back  ^O drive",
+    "parameters": "Esc back  ^P everything",
+    "controls": "↑↓ step  Esc back",
+    "traffic": "Esc back  ^P everything",
+}
+
+
+@pytest.mark.parametrize("name", FOOTERS_80)
+def test_the_footer_of_a_page_begins_with_its_own_keys_and_has_the_help_at_80_and_120_columns(name: str) -> None:
+    assert footer_of(name, 80) == f"{STOP}    {FOOTERS_80[name]}"
+    own = FOOTERS_80[name].removesuffix("  F1").removesuffix("  F1 help")
+    wide = footer_of(name, 120)
+    assert wide.startswith(f"{STOP}    {own}  {MORE_AT_120[name]}") and "  F1" in wide
+
+
+@pytest.mark.parametrize("name", [page.name for page in PAGES])
+def test_any_page_names_one_of_its_own_keys_first_and_the_help_at_80_columns(name: str) -> None:
+    assert footer(name)[0] in SHEETS[name].keys
+    assert "  F1" in footer_of(name, 80)
+
+
+@pytest.mark.parametrize("name", ["main", *(page.name for page in PAGES)])
+def test_each_word_of_a_footer_is_that_of_a_key_and_no_key_is_in_it_twice(name: str) -> None:
+    words = [key.word for key in footer(name)]
+    assert [word for word in SHEETS[name].foot if word != "*" and word not in words] == []
+    assert len({*words}) == len(words)
 
 
 def test_no_capital_is_a_key() -> None:

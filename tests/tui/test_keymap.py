@@ -55,20 +55,20 @@ def test_a_page_has_no_key_that_can_be_set_as_it_is_imported_after_the_keys_are_
 @pytest.mark.parametrize(
     ("wanted", "trouble"),
     [
-        ({"paltte": "^D"}, "keys.paltte: no such function"),
+        ({"paltte": "^T"}, "keys.paltte: no such function"),
         ({"palette": "^X"}, "keys.palette: ^X stops all drives"),
         ({"palette": "ctrl+shift+x"}, "stops all drives"),
         ({"palette": "Enter"}, "keys.palette: Enter cannot be given away"),
         ({"palette": "^I"}, "keys.palette: ^I cannot be given away"),
         ({"palette": "p"}, "keys.palette: p is not a key"),
         ({"palette": "^O"}, "keys.palette: ^O is the key of drive"),
-        ({"palette": "^D", "drive": "^D"}, "is the key of"),
+        ({"palette": "^T", "drive": "^T"}, "is the key of"),
     ],
 )
 def test_a_wrong_setting_is_said_and_changes_nothing(wanted: dict[str, str], trouble: str) -> None:
     found = keymap(bindings(), wanted)
     assert any(trouble in each for each in found.troubles)
-    assert found.keys["palette"] in ("ctrl+p", "ctrl+d")
+    assert found.keys["palette"] in ("ctrl+p", "ctrl+t")
 
 
 def test_two_functions_can_exchange_their_keys() -> None:
@@ -87,19 +87,19 @@ def test_whatever_is_set_the_stop_stays_the_stop_and_every_function_has_its_own_
 @pytest.mark.tui
 async def test_a_key_that_was_set_works_and_is_shown() -> None:
     screen_settings = ScreenSettings(
-        signs="full", keys={"palette": "^D", "page-drives": "F9", "play-f9": "Ctrl+F9"}, where="multidrop.toml"
+        signs="full", keys={"palette": "^T", "page-drives": "F9", "play-f9": "Ctrl+F9"}, where="multidrop.toml"
     )
     app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=screen_settings)
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot)
-        assert "^D everything" in app.main.lines("footer").plain and "F9 all drives" in app.main.lines("footer").plain
+        assert "^T everything" in app.main.lines("footer").plain and "F9 all drives" in app.main.lines("footer").plain
         await pilot.press("ctrl+p")
         assert app.screen is app.main
-        await pilot.press("ctrl+d")
+        await pilot.press("ctrl+t")
         assert isinstance(app.screen, SearchDialog)
         await pilot.press("escape", "f9")
         assert isinstance(app.screen, AllDrives)
-        await pilot.press("ctrl+d")
+        await pilot.press("ctrl+t")
         assert isinstance(app.screen, SearchDialog)
         await press(pilot, "ctrl+x")
         assert app.session.stops == 1
@@ -108,7 +108,7 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
 @pytest.mark.tui
 async def test_a_wrong_setting_is_said_at_the_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("multidrop.toml").write_text('[screen]\ntheme = "no-such"\nsigns = "ascii"\n[keys]\nnothing = "^D"\n')
+    Path("multidrop.toml").write_text('[screen]\ntheme = "no-such"\nsigns = "ascii"\n[keys]\nnothing = "^T"\n')
     screen_settings = ScreenSettings("no-such", "ascii", keys={"nothing": "^D"}, where="multidrop.toml")
     app = MultidropApp(demo_session(), (), FakeAssist(), screen_settings=screen_settings)
     async with app.run_test(size=(120, 24)) as pilot:

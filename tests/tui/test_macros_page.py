@@ -15,7 +15,7 @@ from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.screens.macros import ListedMacro, MacrosPage, macro_row, step_rows
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.traffic import TrafficPage
-from tests.support.fake_session import FakeMacro, demo_session, emit, make_app, on_screen, press, settle
+from tests.support.fake_session import FakeMacro, FakeMacros, demo_session, emit, make_app, on_screen, press, settle
 from tests.support.real_screen import until
 from tests.support.until import PATIENCE
 
@@ -99,6 +99,31 @@ async def test_a_whole_name_that_is_typed_ahead_plays_that_macro() -> None:
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
         await press(pilot, *"shuttle", "enter")
         assert [line for line, _ in session.lines] == ["/play shuttle"]
+
+
+async def test_a_macro_is_played_as_often_as_was_typed_and_a_stop_closes_the_question() -> None:
+    async with on_screen() as (pilot, app, session):
+        await app.run_action("act.page('macros')")
+        await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
+        await press(pilot, *"shuttle", "ctrl+t", "5", "ctrl+x", "enter")
+        assert isinstance(app.screen, MacrosPage) and not any("--times" in line for line, _ in session.lines)
+        session.lines.clear()
+        await press(pilot, "ctrl+t", "escape")
+        assert session.lines == []
+        await press(pilot, "ctrl+t", "5", "enter")
+        assert [line for line, _ in session.lines] == ["/play shuttle --times 5"]
+
+
+async def test_tab_turns_the_page_of_keys() -> None:
+    session = demo_session()
+    session.macros = FakeMacros(FakeMacro("a", "F3"), FakeMacro("b", "F3", page="jog"))
+    async with on_screen(session) as (pilot, app, _):
+        await press(pilot, "ctrl+k")
+        before = app.macros.page
+        await press(pilot, "tab")
+        assert (before, app.macros.page) == ("1", "jog")
+        await press(pilot, "escape")
+        assert "^K keys jog" in app.main.lines("footer").plain
 
 
 async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_before_it() -> None:

@@ -190,3 +190,41 @@ async def test_a_file_and_another_drive_to_compare_with(tmp_path: Path) -> None:
         await emit(pilot, SettingsRead(session.time, "press", "b", Readings((Reading("MS", 64),))))
         await press(pilot, "ctrl+p", *"with another", "enter", "b", "enter")
         assert names(page) == ["MS"]
+
+
+@at_screen
+async def test_a_key_compares_with_the_defaults_a_file_or_another_drive() -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        await press(pilot, "ctrl+f", "enter")
+        assert "768000" in page.lines("table").plain and "default" in page.lines("columns").plain
+        await press(pilot, "ctrl+f", "enter")
+        assert names(page) == ["VM", "IS1"]
+        await press(pilot, "ctrl+f", *"end", "enter")
+        assert len(names(page)) == 7 and "default" not in page.lines("columns").plain
+        await press(pilot, "ctrl+f", *"file", "enter")
+        assert "from /params backup" in page.lines("said").plain
+        await press(pilot, "escape", "ctrl+f", *"another", "enter")
+        assert "the address of another drive" in page.lines("said").plain
+        assert session.sent == []
+
+
+@at_screen
+async def test_keys_back_up_and_restore_a_file_that_is_typed() -> None:
+    async with on_screen() as (pilot, _, session):
+        await opened(pilot, session)
+        await press(pilot, "ctrl+b", *"my kept.toml", "enter")
+        assert session.sent == ["press:a /params backup 'my kept.toml'"]
+        await press(pilot, "ctrl+r", *"kept.toml", "enter")
+        assert session.sent[1:] == ["press:a /params restore kept.toml", "press:a /params read"]
+
+
+@at_screen
+async def test_no_file_is_one_line_and_a_stop_or_escape_ends_the_question() -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        await press(pilot, "ctrl+r", "enter")
+        assert "/params restore: a file name is needed" in page.lines("said").plain
+        await press(pilot, *"kept.toml", "ctrl+x", "enter", "escape")
+        await press(pilot, "ctrl+b", *"kept.toml", "escape", "enter", "escape")
+        assert not any("restore" in line or "backup" in line for line in session.sent)

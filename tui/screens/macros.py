@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shlex
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -190,8 +191,13 @@ class MacrosPage(ListPage):
 
     def typed(self, text: str) -> None:
         """Play the chosen macro, if it was shown; an Enter that was typed ahead plays only a whole name."""
-        if (chosen := self._chosen()) is not None and (self._painted or chosen.name == text):
+        if self._is_meant(text):
             self.action_play()
+
+    def _is_meant(self, text: str) -> bool:
+        """Return whether the chosen macro was shown, or its whole name was typed."""
+        chosen = self._chosen()
+        return chosen is not None and (self._painted or chosen.name == text)
 
     def _type(self, *words: str) -> None:
         self.host.outbox.type(" ".join(words))
@@ -210,6 +216,21 @@ class MacrosPage(ListPage):
         else:
             self.host.show_line(f"{chosen.trouble}; nothing was played", "x")
         self.host.model.changed = True  # it is read again: its file may have changed
+
+    async def action_times(self) -> None:
+        """Ask how often to play the chosen macro, and play the one that was chosen then. A stop closes the question."""
+        chosen, stops = self._chosen(), self.host.session.stops
+        if chosen is None or chosen.macro is None or not self._is_meant(self.words):
+            return
+        macro = chosen.macro
+
+        def answered(times: str | None) -> None:
+            if times:
+                start(self, f"/play {macro.name} --times {shlex.quote(times)}", macro, stops)
+                self.host.model.changed = True
+
+        about = "a number, or forever: until it is stopped"
+        await self.app.push_screen(Ask(f"Play {macro.name} how many times?", about=about), answered)
 
     def action_end(self) -> None:
         if (chosen := self._chosen()) is not None:

@@ -7,6 +7,7 @@ sends the lines that are shown. They go out as if they were typed, and then ever
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -29,6 +30,7 @@ from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
+from multidrop.tui.screens.dialogs import Choose, ListedChoice
 from multidrop.tui.screens.page import ListPage, PageHost, SendingPage
 from multidrop.tui.screens.settings_file import FileColumn
 from multidrop.tui.text import age, fit
@@ -175,6 +177,9 @@ class SettingsTable:
     def compare(self, name: str, values: dict[str, Value]) -> None:
         self.other, self.at = (name, values), 0
 
+    def end_comparison(self) -> None:
+        self.other, self.only_differing = None, False
+
     def heading(self, view: View, glance: Glance | None, width: int, below: Span) -> Row:
         """The drive, how many settings are shown, and when they were read."""
         name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive selected"
@@ -233,13 +238,26 @@ def _aligned(text: str) -> str:
     return f"{fit(shown, VALUE).strip():>{VALUE}}"
 
 
-FILE, DRIVE, EDIT = "file", "drive", "value"
+FILE, DRIVE, EDIT, BACKUP, RESTORE = "file", "drive", "value", "backup", "restore"
+DEFAULT = "default"
+"""The name of the other side of a comparison with the defaults."""
 READING = "reading; the footer shows how far"
 ASKS = {
     FILE: "a file of settings, from /params backup",
     DRIVE: "the address of another drive, whose settings /params read has read",
     EDIT: "a value, or fields with commas; Enter shows the lines, Esc changes nothing",
+    BACKUP: "a name for the new file; Enter reads every setting and writes them to it",
+    RESTORE: "a file of settings, from /params backup; Enter shows what differs and asks before it is sent",
 }
+
+
+def settings_of(host: PageHost, name: str) -> dict[str, Value]:
+    """Return the settings of another drive, which were read before. Raises Diagnostic."""
+    bus, _, address = name.rpartition(":")
+    readout = host.model.bus(bus or host.session.selected_bus).readouts.get(address)
+    if readout is None or readout.settings is None:
+        raise Diagnostic("its settings are not read", name, f"/params read {name} reads them")
+    return readout.settings.values
 
 
 class ParametersPage(ListPage, SendingPage):
@@ -348,10 +366,10 @@ class ParametersPage(ListPage, SendingPage):
     def action_defaults(self) -> None:
         readings = self._settings()
         table = self._table
-        if table.other is not None and table.other[0] == "default":
-            table.other, table.only_differing = None, False
+        if table.other is not None and table.other[0] == DEFAULT:
+            table.end_comparison()
         elif readings is not None and readings.defaults:
-            table.other = ("default", readings.defaults)
+            table.other = (DEFAULT, readings.defaults)
         else:
             self.say(
                 "the defaults of its settings are not known"
@@ -359,10 +377,31 @@ class ParametersPage(ListPage, SendingPage):
                 else "its settings are not read yet"
             )
 
+    async def action_compare(self) -> None:
+        """Choose what to compare with, or which rows of a comparison to show."""
+        table = self._table
+        actions: dict[str, tuple[str, Callable[[], None]]] = {
+            "file": ("With a file", partial(self.action_ask, FILE)),
+            "drive": ("With another drive", partial(self.action_ask, DRIVE)),
+        }
+        if table.other is None or table.other[0] != DEFAULT:
+            actions = {"defaults": ("With the defaults", self.action_defaults), **actions}
+        if table.other is not None:
+            rows_shown = "Show every setting again" if table.only_differing else "Show only what differs"
+            actions = {"differing": (rows_shown, self.action_differing), **actions}
+            actions["end"] = ("End the comparison", table.end_comparison)
+
+        def taken(answer: str | None) -> None:
+            if answer is not None:
+                actions[answer][1]()
+
+        offers = [ListedChoice(key, words) for key, (words, _) in actions.items()]
+        await self.app.push_screen(Choose("Compare the settings", offers), taken)
+
     def action_differing(self) -> None:
         table = self._table
         if table.other is None:
-            self.say("choose first what to compare with: ^P, compare")
+            self.say("choose first what to compare with: ^F")
         else:
             table.only_differing, table.at = not table.only_differing, 0
             self._file_column.look()
@@ -417,25 +456,27 @@ class ParametersPage(ListPage, SendingPage):
             self._close("it was not used")
             return
         try:
-            taken = {FILE: self._file, DRIVE: self._drive, EDIT: self._value}[asked.kind]
-            taken(asked.name, text)
+            if asked.kind == FILE:
+                self._file_column.show(
+                    text, self.host.session.selected, lambda: self._close("") if self.asked is asked else None
+                )
+            elif asked.kind == DRIVE:
+                self._table.compare(text, settings_of(self.host, text))
+                self._close("")
+            elif asked.kind == EDIT:
+                self._value(asked.name, text)
+            else:
+                self._type_with_file(asked.kind, text)
         except Diagnostic as failure:
             self.say(f"nothing was sent: {failure}")
 
-    def _file(self, name: str, text: str) -> None:
-        asked = self.asked
-        self._file_column.show(
-            text, self.host.session.selected, lambda: self._close("") if self.asked is asked else None
-        )
-
-    def _drive(self, name: str, text: str) -> None:
-        bus, _, address = text.rpartition(":")
-        session = self.host.session
-        readout = self.host.model.bus(bus or session.selected_bus).readouts.get(address)
-        if readout is None or readout.settings is None:
-            raise Diagnostic("its settings are not read", text, f"/params read {text} reads them")
-        self._table.compare(text, readout.settings.values)
+    def _type_with_file(self, kind: str, text: str) -> None:
+        """Type `/params backup FILE` or `/params restore FILE`, which asks before it sends anything."""
+        if not text:
+            raise Diagnostic("a file name is needed", f"/params {kind}")
         self._close("")
+        self.host.outbox.type(f"/params {kind} {shlex.quote(text)}")
+        self._reading = kind == RESTORE
 
     def _value(self, name: str, text: str) -> None:
         drive, present = self.host.session.selected, self._settings()

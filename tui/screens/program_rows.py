@@ -96,7 +96,7 @@ def problem_rows(problems: Sequence[Problem], at: int, width: int, most: int = M
             ((f" {sign} ", role), (f"{place:<7} ", "dim"), (fit(visible(problem.what + hint), width - 12), "text"))
         )
     if len(problems) > most:
-        rows[-1] = ((fit(f"   … and {len(problems) - most + 1} more; ^L goes from one to the next", width), "dim"),)
+        rows[-1] = ((fit(f"   … and {len(problems) - most + 1} more; ^F goes from one to the next", width), "dim"),)
     return rows
 
 

@@ -56,10 +56,13 @@ class Banner(Lines):
 STOP = "^X STOP ALL"
 
 
-def footer_row(keys: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int, progress: str = "") -> Row:
-    """The stop and the keys that work here, (key, word), in `width` cells; a function without a key is left out.
+def footer_row(
+    keys: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int, progress: str = "", help_: str = ""
+) -> Row:
+    """Return the stop and the keys that work here, (key, word), in `width` cells.
 
-    `progress`: the words on the job that runs, after the stop.
+    A function without a key is left out. Keys that do not fit are left out, the last ones first. `progress`: the words
+    on the job that runs, after the stop. `help_`: the key of the help, which is always there; its word is if it fits.
     """
     keys = [(key, word[:14]) for key, word in keys if key]
     if recording:
@@ -69,11 +72,16 @@ def footer_row(keys: Sequence[tuple[str, str]], recording: bool, latched: bool, 
     row: list[Span] = [*STOP_ROW]
     if progress:
         row.append((f" {fit(progress, max(0, width - width_of(row) - 2)).rstrip()} ", "strong"))
+    last = help_ if all(key != help_ for key, _ in keys) else ""
+    room = width - 1 - (len(last) + 2 if last else 0)
     for key, what in keys:
         span: list[Span] = [("  ", "text"), (key, "key"), (f" {what}", "dim")]
-        if width_of(row) + width_of(span) > width - 1:
+        if width_of(row) + width_of(span) > room:
             break
         row += span
+    if last and room >= width_of(row):
+        row += [("  ", "text"), (last, "key")]
+        row += [(" help", "dim")] if width_of(row) + len(" help") < width else []
     return tuple(row)
 
 
@@ -98,7 +106,7 @@ def key_at(row: Row, x: int) -> str:
     return ""
 
 
-MOVING = frozenset({"act.play", "play", "jog", "step", "enter"})
+MOVING = frozenset({"act.play", "play", "jog", "step", "enter", "submit"})
 """Actions that may move a drive, or send what is pending: they need their key. A click may only focus the terminal."""
 
 
