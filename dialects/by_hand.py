@@ -63,7 +63,7 @@ class ProgramSlot:
 
     name: str
     lines: Mapping[str, str]
-    """By `ACTIONS`; an action that is not there does not exist."""
+    """By `ACTIONS`; a missing action does not exist."""
 
 
 Progress = Callable[[int, int], None]
@@ -77,7 +77,7 @@ class ByHand(OfDrive):
     no_programs = "drives of this family have no programs that can be paused by a line"
 
     def variables(self, progress: Progress) -> Procedure[tuple[Variable, ...]]:
-        """Read the variables of the programs. Raises Inexpressible where there are none, Refused or NoAnswer."""
+        """Read the variables of the programs. Raises Inexpressible for a drive without variables, Refused or NoAnswer."""
         raise Inexpressible(f"{who(self.state)}: {self.no_variables}; nothing was sent")
         yield  # a conversation
 

@@ -21,7 +21,7 @@ READING = "reading; the footer shows how far"
 
 
 def narrowed(variables: Sequence[Variable], words: str) -> list[Variable]:
-    """The variables that have every typed word in name, value or remark; one with just that name first."""
+    """The variables that have every typed word in name, value or comment; one with just that name first."""
     wanted = words.casefold().split()
     found = [
         each for each in variables if all(word in f"{each.name} {each.value} {each.kept}".casefold() for word in wanted)
@@ -204,7 +204,7 @@ class VariablesPage(ListPage, SendingPage):
         variable = next((each for each in self._variables() or () if each.name == asked.name), None)
         try:
             if variable is None:
-                raise Diagnostic("is not there any more", asked.name, "^P, read again")
+                raise Diagnostic("does not exist any more", asked.name, "^P, read again")
             line = self._by_hand().assign(variable, variable.taken(text))
         except (Diagnostic, Inexpressible) as problem:
             self.say(f"nothing was sent: {problem}")
