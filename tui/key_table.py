@@ -91,7 +91,7 @@ class KeySheet(NamedTuple):
 
     title: str
     about: str
-    """What it is for and how it is used, in six sentences at most."""
+    """What it is for and how it is used, in five sentences at most."""
     groups: Mapping[str, Sequence[Key]]
     below: Sequence[str]
     """The sheets whose keys work here, too."""

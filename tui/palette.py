@@ -12,7 +12,7 @@ from textual.fuzzy import Matcher
 from multidrop.base.files import rows
 from multidrop.shell.hooks import switches as added
 from multidrop.shell.session import Session
-from multidrop.tui.key_table import SHEETS, all_groups
+from multidrop.tui.key_table import SHEETS, STOP, all_groups, footer
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.table import PANELS
 from multidrop.tui.screens.dialogs import Match
@@ -39,6 +39,12 @@ class PaletteCommand(NamedTuple):
     """It comes before what was used lately."""
     here: bool = False
     """It is a function of the page in front."""
+    words: str = ""
+    """Everyday words for it that its title lacks, by which it is found."""
+
+
+SYNONYMS = {row["command"]: row["words"] for row in rows(__file__, "synonyms.csv")}
+"""Everyday words by the beginning of a title."""
 
 
 def ordered(commands: Sequence[PaletteCommand], recent: Sequence[str]) -> list[PaletteCommand]:
@@ -58,7 +64,23 @@ def all_commands(
     switches: Mapping[str, bool],
     sheet: str = "",
 ) -> Iterator[PaletteCommand]:
-    """Each function, the most urgent first; those of the page in front come next. `switches`: what is on."""
+    """Yield each function with its everyday words: the most urgent first, then those of the page in front.
+
+    `switches`: what is on.
+    """
+    for command in _titled(session, macros, verbs, keys, switches, sheet):
+        words = next((words for head, words in SYNONYMS.items() if command.title.startswith(head)), "")
+        yield command._replace(words=words)
+
+
+def _titled(
+    session: Session,
+    macros: FunctionKeys,
+    verbs: Iterable[tuple[str, str, str]],
+    keys: Keymap,
+    switches: Mapping[str, bool],
+    sheet: str,
+) -> Iterator[PaletteCommand]:
     yield PaletteCommand("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)
     if session.latched:
         yield PaletteCommand("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
@@ -132,18 +154,27 @@ def _call(name: str, *arguments: str) -> str:
 
 
 def commands_like(commands: Sequence[PaletteCommand], typed: str, width: int) -> list[Match]:
-    """The commands that hold every typed word, then those with the letters in their titles; all for an empty text."""
+    """Return the commands that match a typed text, the best first; all for an empty text.
+
+    The order: the title begins with it, everyday words for the function, the title has it, the title or the meaning has
+    it, the title has its letters.
+    """
     words, matcher = typed.casefold().split(), Matcher(typed)
     ranked: list[tuple[int, float, int]] = []
     for number, command in enumerate(commands):
-        title, all_of_it = command.title.casefold(), f"{command.title} {command.about}".casefold()
+        title, all_of_it = command.title.casefold(), f"{command.title} {command.about} {command.words}".casefold()
+        everyday = {*command.words.split(), *title.split()}
         score = matcher.match(command.title) if words else 1.0
-        if all(word in title for word in words):
+        if title.startswith(" ".join(words)):
             ranked.append((0, -score, number))
-        elif all(word in all_of_it for word in words):
-            ranked.append((1, -score, number))
-        elif score:
+        elif everyday.issuperset(words):
+            ranked.append((1, 0.0, number))
+        elif all(word in title for word in words):
             ranked.append((2, -score, number))
+        elif all(word in all_of_it for word in words):
+            ranked.append((3, -score, number))
+        elif score:
+            ranked.append((4, -score, number))
     return [Match(str(number), _shown(commands[number], width)) for _, _, number in sorted(ranked)]
 
 
@@ -157,13 +188,22 @@ def _shown(command: PaletteCommand, width: int) -> Text:
 
 Entry = tuple[str, str]
 """A key, a line or a sign, and its meaning; a heading has an empty meaning."""
+MOST_USED = 6
+"""The number of keys at the beginning of the help, with the stop."""
 KEY = 15
 """Width of keys, lines and signs."""
 
 
 def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
-    """All help for a page or a box: what it is for, its keys in groups, the pages that are near, and the rest."""
+    """Return all help for a page or a box.
+
+    It begins with what it is for in a few sentences, and the keys that are used most. All its keys in groups follow,
+    then the pages that are near, and the rest.
+    """
     listed: list[Entry] = [(SHEETS[sheet].title.capitalize(), ""), ("", SHEETS[sheet].about)]
+    most = [key for key in footer(sheet) if key.name != "help"][: MOST_USED - 1]
+    listed += [("Used most", ""), (STOP.shown, STOP.about)]
+    listed += [(keys.shown(key.name) if key.name else key.shown, key.about) for key in most]
     groups = all_groups(sheet)
     near = groups.pop("Pages", [])
     for group, of_group in groups.items():
@@ -190,11 +230,13 @@ def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
 
 
 def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:
-    """The entries that contain every typed word, each wrapped between words."""
+    """Return the entries that contain every typed word, each once, wrapped between words; all for an empty text."""
     wanted = typed.casefold().split()
     matches = []
     for number, (key, what) in enumerate(entries):
-        if (what or not wanted) and all(word in f"{key} {what}".casefold() for word in wanted):
+        if wanted and (not what or (key, what) in entries[:number]):
+            continue
+        if all(word in f"{key} {what}".casefold() for word in wanted):
             matches.append(Match(str(number), _wrapped(visible(key), visible(what), width)))
     return matches
 

@@ -134,10 +134,10 @@ def test_no_function_key_but_those_of_macros_moves_and_none_is_a_stop() -> None:
 
 
 @pytest.mark.parametrize("name", SHEETS)
-def test_a_sheet_says_what_it_is_for_in_six_sentences_at_most(name: str) -> None:
+def test_a_sheet_says_what_it_is_for_in_five_sentences_at_most(name: str) -> None:
     sheet = SHEETS[name]
     assert bool(sheet.about) is (sheet.title not in ("everywhere", "boxes"))
-    assert sheet.about.count(". ") + 1 <= 6
+    assert sheet.about.count(". ") + 1 <= 5
     assert all(len(sentence.split()) <= 24 for sentence in sheet.about.split(". "))
 
 

@@ -139,7 +139,15 @@ async def test_help_is_for_where_you_are_and_can_be_searched() -> None:
         assert isinstance(app.screen, SearchDialog)
         shown = [match.text.plain for match in app.screen.found]
         assert shown[0] == "All drives" and shown[1].startswith("Every drive of every line has a row")
-        assert shown[2] == "Rows" and shown[3].startswith("↑↓")
+        assert shown[2] == "Used most" and [row.split()[0] for row in shown[3:9]] == [
+            "^X",
+            "Enter",
+            "Esc",
+            "^Y",
+            "^N",
+            "^O",
+        ]
+        assert shown[9] == "Rows" and shown[10].startswith("↑↓")
         assert next(each for each in shown if each.startswith("^G")) in shown[shown.index("Near") :]
         assert not any(each.startswith("^A") for each in shown)
         await pilot.press(*"stop all")
