@@ -31,6 +31,7 @@ from multidrop.drives.events import (
 from multidrop.shell import events
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.tui.curves.chart import ChartView
+from multidrop.tui.curves.marks import MarkKind, PlotMark
 from multidrop.tui.curves.samples import Traces
 from multidrop.tui.figures import NATIVE, Figures
 from multidrop.tui.readout import READ, Readout, ReadoutState
@@ -53,6 +54,9 @@ class Happening(NamedTuple):
     text: str
     warning: bool = False
     help: str = ""
+    limit: str = ""
+    """The limit that was reached, where it is that."""
+    axis: str = ""
 
 
 SILENT = Happening("no reply to polls", warning=True)
@@ -80,13 +84,13 @@ def changes_of(
         if axis is not None and axis.last is not None and axis.trouble != event.trouble:
             text = event.trouble or f"cleared: {axis.trouble}"
             when = between(axis.last.at, event.at) if event.at - axis.last.at > LATE_AFTER else ""
-            yield Happening(_named(text, event.axis) + when, warning=bool(event.trouble))
+            yield Happening(_named(text, event.axis) + when, warning=bool(event.trouble), axis=event.axis)
     else:
         for each, after in zip(known.axes, event.conditions, strict=False):
             late = each.conditions is not None and event.at - each.conditioned_at > LATE_AFTER
             when = between(each.conditioned_at, event.at) if late else ""
             for happening in _conditioned(each, after, known.failed_at, late):
-                yield happening._replace(text=happening.text + when)
+                yield happening._replace(text=happening.text + when, axis=after.axis)
 
 
 def _conditioned(known: Readout, after: Conditions, failed_at: float, late: bool) -> Iterator[Happening]:
@@ -99,7 +103,8 @@ def _conditioned(known: Readout, after: Conditions, failed_at: float, late: bool
         if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
             place = "" if last is None or late else f" at {known.figures.place(last.position)}"
             stands = "; it is at rest" if last is not None and last.velocity == 0 and not late else ""
-            yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
+            limit = LIMITS[lamp.function]
+            yield Happening(_named(f"{limit} reached{place}{stands}", after.axis), warning=True, limit=limit)
     told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
     if after.error and not before.error and not told:
         if after.error == UNREAD:
@@ -198,6 +203,8 @@ class TrafficStore:
 
 VERBS = "refused|replied|does|did|is|has|had|holds|cannot|moves"
 """Words after the name of a drive; without one of them, `a` is an article."""
+MOST_MARKS = 1000
+"""Marks that are kept of a line for its plots."""
 MOST_FRESH_RECORDS = 50_000
 """Records that a transcript keeps."""
 
@@ -247,6 +254,8 @@ class BusFacts:
     fresh: deque[Record] = field(default_factory=lambda: deque(maxlen=MOST_FRESH_RECORDS))
     """Records that no transcript has taken yet."""
     readouts: dict[str, Readout] = field(default_factory=dict)
+    marks: deque[PlotMark] = field(default_factory=lambda: deque(maxlen=MOST_MARKS))
+    """What happened to its drives, for their curves."""
     traffic: TrafficStore = field(default_factory=TrafficStore)
     stop: StopSummary | None = None
     """The last stop of several drives that was confirmed for one of them."""
@@ -296,6 +305,7 @@ class ScreenModel:
                     self._touch(self.bus(event.bus), event.address, event.at)
                     if event.address not in EVERYONE and not event.line.startswith("/"):
                         self.bus(event.bus).readout(event.address).sent = event.line, event.at
+                self._mark_sent(event)
                 mine = event.by is events.By.OPERATOR
                 record = Record(event.at, event.address, ">" if mine else "»", event.line, mine=mine)
                 self._of_drive(event.bus, record)
@@ -321,6 +331,10 @@ class ScreenModel:
                 explained = "" if event.code is None else f"/help {event.code}"
                 mine = event.by is events.By.OPERATOR
                 self._of_drive(event.bus, Record(event.at, event.address, "x", event.text, mine=mine, help=explained))
+                if event.bus and event.address not in EVERYONE:
+                    label = "" if event.code is None else f"error {event.code}"
+                    failed = PlotMark(event.at, event.address, MarkKind.ERROR, event.text, label)
+                    self.bus(event.bus).marks.append(failed)
             case events.Bytes():
                 mark = "↑" if event.outgoing else "↓"
                 rows = [Record(event.at, "", mark, row, columns=True, mine=False) for row in event.rows]
@@ -385,6 +399,15 @@ class ScreenModel:
             record = record._replace(text=re.sub(rf"^{own}(?:: | (?=(?:{VERBS})\b))", "", record.text))
         self.page(bus).append(record._replace(name=name))
 
+    def _mark_sent(self, event: events.Entered) -> None:
+        """Mark a line for a drive, or for all of a bus, on the curves; verbs are not sent."""
+        line = event.line
+        if line.startswith("@"):
+            line = line.partition(" ")[2].strip()
+        if event.bus and line and not line.startswith("/"):
+            address = None if event.address in EVERYONE else event.address
+            self.bus(event.bus).marks.append(PlotMark(event.at, address, MarkKind.SENT, line))
+
     def rename(self, before: str, now: str) -> None:
         self.buses[now] = self.buses.pop(before, BusFacts())
         self.traces.rename(before, now)
@@ -397,6 +420,7 @@ class ScreenModel:
         """Mark all values as possibly outdated after a stop, so that all drives are polled."""
         for facts in self.buses.values():
             self._touch(facts, EVERYONE[0], at)
+            facts.marks.append(PlotMark(at, None, MarkKind.STOP, "stop of all drives", "stop"))
             for axis in (axis for readout in facts.readouts.values() for axis in readout.axes):
                 axis.program.stopped_at = at
         self.changed = True
@@ -417,6 +441,11 @@ class ScreenModel:
             happened = list(changes_of(readout, inner, self._between))
             readout.note(inner)
             for happening in happened:
+                if happening.warning:
+                    kind = MarkKind.LIMIT if happening.limit else MarkKind.ERROR
+                    label = happening.limit or happening.text.partition(":")[0]
+                    marked = PlotMark(inner.at, inner.address, kind, happening.text, label, happening.axis)
+                    self.bus(event.bus).marks.append(marked)
                 mark = "!" if happening.warning else "."
                 self._of_drive(event.bus, Record(inner.at, inner.address, mark, happening.text, help=happening.help))
         elif isinstance(inner, events.TwinEvent):

@@ -127,9 +127,22 @@ def nice_scale(low: float, high: float, rows: int, least: float = 1.0) -> TickSc
     raise AssertionError
 
 
+HEADROOM, MOST_HEADROOM = 0.1, 1.5
+"""Share of the width of the values that a new scale leaves free beyond each end that is not 0, unless that makes the
+scale wider than the narrowest one by more than the factor: ends are round.
+"""
+
+
 def steady(before: TickScale | None, low: float, high: float, rows: int, least: float) -> TickScale:
-    """The scale before while it fits: it grows at once, and shrinks when the values fill less than a third of it."""
-    fitting = nice_scale(low, high, rows, least)
+    """The scale before while it fits: it grows at once, and shrinks when the values fill less than a third of it.
+
+    A new one has some room beyond the values, so that values which go on rising do not change it with each sample.
+    """
+    room = HEADROOM * (high - low)
+    narrowest = nice_scale(low, high, rows, least)
+    fitting = nice_scale(low - room * (low != 0), high + room * (high != 0), rows, least)
+    if fitting.high - fitting.low > MOST_HEADROOM * (narrowest.high - narrowest.low):
+        fitting = narrowest
     if before is None or low < before.low or high > before.high:
         return fitting
     return fitting if fitting.high - fitting.low < (before.high - before.low) / 2.5 else before
@@ -274,6 +287,18 @@ def _runs(signs: Sequence[str], owners: Sequence[int]) -> list[Run]:
             runs.append((text, owner))
         begin = end
     return runs
+
+
+def with_text(runs: Sequence[Run], at: int, text: str, owner: int) -> list[Run]:
+    """Put a text into a row from a column of cells on, over what is there."""
+    with_it: list[Run] = []
+    begin = 0
+    for piece, own in runs:
+        left, right = piece[: max(0, at - begin)], piece[max(0, at + len(text) - begin) :]
+        here = [(text, owner)] if begin <= at < begin + len(piece) else []
+        with_it += [run for run in ((left, own), *here, (right, own)) if run[0]]
+        begin += len(piece)
+    return with_it
 
 
 def with_cursor(runs: Sequence[Run], at: int, sign: str) -> list[Run]:

@@ -14,6 +14,7 @@ from multidrop.tui.curves.chart import Chart, ChartView, ColumnWindow, Extent
 from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, TickScale, row_of, ticks, with_cursor
 from multidrop.tui.curves.samples import TraceQuantity
 from multidrop.tui.curves.trigger import TriggerState
+from multidrop.tui.panels.plot_marks import ROLES, MarkedChart, with_marks
 from multidrop.tui.panels.plotted import PLOTTED, ChartGroup, PlottedLine, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.text import age, fit, short
@@ -25,7 +26,7 @@ LEAST_SPANS = {"velocity": 100.0, "position": 10.0}
 """The least width of a scale."""
 WIDE_FROM, HEADS = 64, 3
 """Width of a plot from which a legend may have several rows, and the most of them."""
-_ROLES = {EMPTY: "text", CURSOR: "strong", **{n: role_of(n) for n in range(2 * TWINS)}}
+_ROLES = {EMPTY: "text", CURSOR: "strong", **ROLES, **{n: role_of(n) for n in range(2 * TWINS)}}
 """The role of a cell by its owner."""
 
 
@@ -43,8 +44,8 @@ def columns_of(width: int) -> int:
     return max(1, width - AXIS)
 
 
-def chart_rows(view: View, shown: ShownGroup, window: ColumnWindow, height: int) -> list[Row]:
-    """The rows of a chart, from top to bottom."""
+def chart_rows(view: View, shown: ShownGroup, window: ColumnWindow, height: int, texts: bool = True) -> list[Row]:
+    """The rows of a chart, from top to bottom; with `texts` its marks have theirs."""
     if height < 1:
         return []
     look = view.model.look
@@ -55,6 +56,7 @@ def chart_rows(view: View, shown: ShownGroup, window: ColumnWindow, height: int)
         own = TickScale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
         lines.append((line.quantity, line.stroke, own))
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
+    drawn = with_marks(MarkedChart(view, list(shown.moving), shown.chart, window, scale, texts), drawn)
     marks = ticks(scale, height)
     cursors = [
         (int(at // window.dot) // window.wide - window.first, sign)
@@ -90,8 +92,6 @@ def _scale(view: View, shown: ShownGroup, rows: int) -> TickScale:
     trace = view.model.traces.get(first.quantity)
     newest = trace.values[-1] if trace is not None and trace.values else 0.0
     extents = [line.extent(extent) for line, extent in shown.moving.items()]
-    if word == "position":  # a stated travel is the range of the chart
-        extents += [line.extent(Extent(*line.figures.travel)) for line in shown.moving if line.figures.travel]
     middle, convert = newest if centre is None else centre, first.conversion
     least = LEAST_SPANS.get(word, 1.0) * abs(convert.gain)
     return shown.chart.scale(extents, least, word == "velocity", look.zoom, convert.value(middle), rows)
@@ -255,9 +255,10 @@ def _charts(view: View, found: Sequence[ChartGroup], width: int, height: int) ->
             if extent in (None, (0, 0)) and group.word == "velocity" and line.quantity[:3] in positions:
                 continue
             too: Row = ((", its twin too", "dim"),) if line in agreeing else ()
-            words.append((*_words(view, line, extent, velocities.get(line.quantity[:3])), *too))
+            words.append(_within((*_words(view, line, extent, velocities.get(line.quantity[:3])), *too), width))
         if len(words) > SAID:
-            words[SAID - 1 :] = [((f" and {len(words) - SAID + 1} more that do not change", "dim"),)]
+            others = f" and {len(words) - SAID + 1} more that do not change"
+            words[SAID - 1 :] = [_within(((others, "dim"),), width)]
         shown.append(ShownGroup(group, chart, moving, tuple(words)))
     return _stacked(view, shown, window, width, height)
 
@@ -270,6 +271,15 @@ def _take(view: View, group: ChartGroup, window: ColumnWindow) -> tuple[ChartGro
     chart = charts.setdefault(key, Chart())
     extents = chart.take(view.model.traces, [line.quantity for line in group.lines], window)
     return group, chart, {line: extents[line.quantity] for line in group.lines if line.quantity in extents}
+
+
+def _within(row: Row, width: int) -> Row:
+    """A row, cut where it is wider than its room."""
+    kept: list[Span] = []
+    for text, role in row:
+        room = width - width_of(kept)
+        kept.append((text if width_of([(text, role)]) <= room else fit(text, room), role))
+    return tuple(kept)
 
 
 def _agree(twin: PlottedLine, extents: Mapping[PlottedLine, Extent]) -> bool:
@@ -317,11 +327,15 @@ def _stacked(view: View, shown: Sequence[ShownGroup], window: ColumnWindow, widt
     timed = bool(charts) and room - 1 >= (LOWEST_CHART + 1) * charts
     rows: list[Row] = []
     shares = _shares([group for group in kept if group.moving], room - timed)
+    said: set[str] = set()
+    """The drives whose marks have their texts in a chart above."""
     for group in kept:
         rows += group.words
         if group.moving:
+            names = {line.name for line in group.moving}
             rows += heads.pop(0)
-            rows += chart_rows(view, group, window, shares.pop(0))
+            rows += chart_rows(view, group, window, shares.pop(0), not names <= said)
+            said |= names
     if timed:
         rows.append(time_row(view, window))
     if left_out:

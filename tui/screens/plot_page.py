@@ -13,18 +13,23 @@ from multidrop.shell import plot_targets
 from multidrop.shell.plots.batch import Batch, PlottedCurve
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import ChartView
+from multidrop.tui.curves.marks import PlotMark
 from multidrop.tui.curves.trigger import TriggerSetting, TriggerState
 from multidrop.tui.panels.plot import columns_of, plot_rows, plot_title
+from multidrop.tui.panels.plot_marks import marks_of, sign_of
 from multidrop.tui.panels.plotted import PLOTTED, PlottedLine, groups, role_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
 from multidrop.tui.screens.page import AskingPage, PageHost
+from multidrop.tui.text import visible
 from multidrop.tui.widgets.lines import Row, Span, width_of
 
 EDGES = {"rise": True, "fall": False}
 USUAL_SHARE = "20%"
 """The share of the picture before the edge."""
 FORM = "CURVE rise|fall LEVEL [SHARE%]"
+MOST_NAMED, NEAR = 3, 1.5
+"""Marks that are named at the cursor, and the cells within which a mark is near it."""
 SHORTEST_SPAN = 0.001
 """The least time between two cursors, s, of which the frequency is shown."""
 
@@ -108,6 +113,7 @@ def cursor_rows(view: View, width: int, most: int) -> list[Row]:
         pieces[0][1:] = [(f" {apart}", "strong")]
         if abs(at - other) >= SHORTEST_SPAN:
             pieces.append([(f"1/dt {1 / abs(at - other):.4g} Hz  ", "strong")])
+    pieces += _mark_pieces(view, at, look.cells(columns_of(width))[1])
     for group in groups(view):
         chart = look.charts.get((group.word, group.key, columns_of(width)))
         for line in group.lines if chart is not None else ():
@@ -126,6 +132,30 @@ def cursor_rows(view: View, width: int, most: int) -> list[Row]:
             rows.append([(" ", "text")])
         rows[-1] += piece
     return [tuple(row) for row in rows]
+
+
+def _mark_pieces(view: View, at: float, cell: float) -> list[list[Span]]:
+    """The marks within a cell of a time: sign, drive, text and time of each."""
+    lines = _lines(view)
+    found: dict[PlotMark, str] = {}
+    for line in lines:
+        for mark in marks_of(view, line, lines, at - NEAR * cell, at + NEAR * cell):
+            found.setdefault(mark, line.name)
+    nearest = sorted(found, key=lambda mark: abs(mark.at - at))
+    pieces: list[list[Span]] = [
+        [
+            (
+                f"{sign_of(view, mark.kind)} {found[mark] if mark.address is not None else 'all drives'} ",
+                mark.kind.role,
+            ),
+            (f"{visible(mark.text)} ", "strong"),
+            (f"{view.session.wall(mark.at):%H:%M:%S.%f}"[:-4] + "  ", "dim"),
+        ]
+        for mark in nearest[:MOST_NAMED]
+    ]
+    if len(nearest) > MOST_NAMED:
+        pieces.append([(f"and {len(nearest) - MOST_NAMED} more marks  ", "dim")])
+    return pieces
 
 
 def samples_of(view: View, width: int) -> Batch:
