@@ -77,7 +77,7 @@ class ByHand(OfDrive):
     no_programs = "drives of this family have no programs that can be paused by a line"
 
     def variables(self, progress: Progress) -> Procedure[tuple[Variable, ...]]:
-        """Read the variables of the programs. Raises Inexpressible for a drive without variables, Refused or NoAnswer."""
+        """Read the variables of the programs. Raises Inexpressible for a drive without any, Refused or NoAnswer."""
         raise Inexpressible(f"{who(self.state)}: {self.no_variables}; nothing was sent")
         yield  # a conversation
 
