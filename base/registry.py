@@ -82,6 +82,7 @@ DEFAULT = "mcode"
 """The language of drives of which nothing is said."""
 IN_WHEEL: dict[str, tuple[str, ...]] = {
     "certify": ("certify",),
+    "checksums": ("checksum", "/checksum"),
     "convert": ("program convert",),
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.codec import Procedure
@@ -66,14 +66,72 @@ class ProgramSlot:
     """By `ACTIONS`; a missing action does not exist."""
 
 
+class PointField(NamedTuple):
+    """One value of a set-up, by its number: what each number means, in words."""
+
+    label: str
+    choices: Mapping[int, str]
+    mask: int = 0
+    """The bits of a whole number that it is; 0: it is a field of its own, or the whole number."""
+
+    @property
+    def _shift(self) -> int:
+        return (self.mask & -self.mask).bit_length() - 1
+
+    def of(self, value: object, number: int) -> int | None:
+        """Return its number in the value of a setting, where it is the field with this place; None: it has none."""
+        if isinstance(value, tuple):
+            value = value[number] if number < len(value) else None
+        if not isinstance(value, int):
+            return None
+        return (value & self.mask) >> self._shift if self.mask else value
+
+    def put(self, value: Fields, number: int, chosen: int) -> Fields:
+        """Return the value of a setting with another number in it."""
+        if isinstance(value, tuple):
+            return tuple(chosen if at == number else each for at, each in enumerate(value))
+        if self.mask and isinstance(value, int):
+            return (value & ~self.mask) | (chosen << self._shift)
+        return chosen
+
+    def shown(self, number: int) -> str:
+        """Return a number with its word: `1 home`."""
+        return f"{number} {self.choices.get(number, '')}".rstrip()
+
+    def read(self, text: str) -> int:
+        """Return the number of a typed choice: the number, its word, or the beginning of that. Raises Diagnostic."""
+        typed = " ".join(text.split()).casefold()
+        exact = [n for n, word in self.choices.items() if typed in (str(n), word.casefold(), self.shown(n).casefold())]
+        begun = [n for n, word in self.choices.items() if typed and word.casefold().startswith(typed)]
+        found = exact or begun
+        if len(found) != 1:
+            valid = ", ".join(map(self.shown, self.choices))
+            raise Diagnostic(f"no {self.label} {text.strip()[:20]}".rstrip(), "", f"valid: {valid}")
+        return found[0]
+
+
+@dataclass(frozen=True)
+class PointSetup:
+    """The set-up of one input or output: a setting, and its fields."""
+
+    setting: str
+    label: str
+    fields: tuple[PointField, ...]
+
+
+Fields = Any
+"""The value of a setting: a number, or the fields of a set-up."""
 Progress = Callable[[int, int], None]
 
 
 class ByHand(OfDrive):
     """What a person edits and switches of a drive. By default nothing."""
 
+    outputs_by_type = False
+    """A point is an output only where its set-up says so; the conditions have it then."""
     no_variables = "drives of this family have no variables of their own"
     no_outputs = "drives of this family have no outputs that a line switches"
+    no_points = "drives of this family have no inputs and outputs that can be set up"
     no_programs = "drives of this family have no programs that can be paused by a line"
 
     def variables(self, progress: Progress) -> Procedure[tuple[Variable, ...]]:
@@ -95,4 +153,8 @@ class ByHand(OfDrive):
 
     def programs(self) -> Sequence[ProgramSlot]:
         """Return the programs that lines run, pause and stop."""
+        return ()
+
+    def points(self) -> Sequence[PointSetup]:
+        """Return the set-ups of inputs and outputs, by the names of their settings."""
         return ()

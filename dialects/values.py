@@ -267,6 +267,17 @@ class Pace:
 
 
 @dataclass(frozen=True)
+class SlotState:
+    """The state of one of several programs, by the name of its `by_hand.ProgramSlot`."""
+
+    name: str
+    state: str
+    line: str = ""
+    """Its place, where it runs or waits."""
+    runs: bool = False
+
+
+@dataclass(frozen=True)
 class Conditions:
     """The conditions of one axis of a drive."""
 
@@ -285,6 +296,8 @@ class Conditions:
     """Whether a program runs in the drive that can move it; None: this axis, or the family, does not report it."""
     line: str = ""
     """The place of the running program; empty where the drive does not report it."""
+    slots: tuple[SlotState, ...] = ()
+    """Each program, of a drive that runs several at once."""
     target: int | None = None
     """The end of the move that is under way, where it is known."""
     limits: tuple[int, int] | None = None

@@ -369,6 +369,8 @@ def test_page(snap_compare: Compare, name: str, size: str) -> None:
 # Forms
 
 FORMS = {
+    "outputs": ("2",),
+    "programs": ("down", "enter"),
     "setup": ("down", "enter", *"5 mm", "enter", "down", "enter", *"0 to 300", "enter", "ctrl+s"),
     "variables": ("r", "down", "enter", *"77", "enter"),
 }

@@ -6,11 +6,25 @@ V32 to V63 are kept by STORE, V0 to V31 are 0 after power-up. (PMX-2ED-SA manual
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from multidrop.dialects.by_hand import GO_ON, PAUSE, RUN, STOP, ByHand, Output, ProgramSlot, Progress, Variable
+from multidrop.dialects.by_hand import (
+    GO_ON,
+    PAUSE,
+    RUN,
+    STOP,
+    ByHand,
+    Output,
+    PointField,
+    PointSetup,
+    ProgramSlot,
+    Progress,
+    Variable,
+)
 from multidrop.dialects.codec import Procedure
 from multidrop.families.pmx.host.codec import PmxState
 from multidrop.families.pmx.host.operations import PROGRAMS, number
+from multidrop.families.pmx.manual import table
 
 VARIABLES = 64
 KEPT_FROM = 32
@@ -18,6 +32,18 @@ OUTPUTS = 8
 STORE = "STORE"
 CONTROLS = {STOP: 0, RUN: 1, PAUSE: 2, GO_ON: 3}
 """The values of SR (7.19.2)."""
+
+
+LEVEL = {0: "normal", 1: "inverted"}
+OF_AXIS = tuple(
+    PointField(label, LEVEL, mask)
+    for label, mask in (("home switch", 0x20), ("limit switches", 0x40), ("Z index", 0x80))
+)
+"""The polarities of an axis (table 7.7)."""
+OF_ALL = tuple(
+    PointField(label, LEVEL, mask)
+    for label, mask in (("digital inputs", 0x400), ("digital outputs", 0x800), ("motor drivers", 0x1000))
+)
 
 
 class PmxByHand(ByHand):
@@ -44,4 +70,12 @@ class PmxByHand(ByHand):
         return [Output(n, f"DO{n}=1", f"DO{n}=0") for n in range(1, OUTPUTS + 1)]
 
     def programs(self) -> Sequence[ProgramSlot]:
-        return [ProgramSlot(str(n), {action: f"SR{n}={value}" for action, value in CONTROLS.items()}) for n in PROGRAMS]
+        return [
+            ProgramSlot(f"program {n}", {action: f"SR{n}={value}" for action, value in CONTROLS.items()})
+            for n in PROGRAMS
+        ]
+
+    def points(self) -> Sequence[PointSetup]:
+        """The polarities: bits of POLX and POLY; those of inputs, outputs and drivers are in POLX."""
+        both = [PointSetup(f"POL{axis}", f"axis {axis}", OF_AXIS) for axis in table.AXES]
+        return [replace(both[0], fields=(*OF_AXIS, *OF_ALL)), *both[1:]]

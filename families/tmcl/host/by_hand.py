@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from multidrop.base.errors import Refused
-from multidrop.dialects.by_hand import ByHand, Output, Progress, Variable
+from multidrop.dialects.by_hand import ByHand, Output, PointField, PointSetup, Progress, Variable
 from multidrop.dialects.codec import Procedure
 from multidrop.families.tmcl.host.codec import TmclState
 from multidrop.families.tmcl.host.operations import read
@@ -17,6 +17,9 @@ from multidrop.families.tmcl.manual.modules import USERS, module_of
 
 BANK = 2
 """The bank of user variables, and of the outputs of SIO."""
+
+
+STOPS = PointField("limit switch", {0: "stops the motor", 1: "is ignored"})
 
 
 class TmclByHand(ByHand):
@@ -48,3 +51,11 @@ class TmclByHand(ByHand):
     def outputs(self) -> Sequence[Output]:
         ports = module_of(self.state.product).outputs
         return [Output(n, f"SIO {n}, {BANK}, 1", f"SIO {n}, {BANK}, 0") for n in ports]
+
+    def points(self) -> Sequence[PointSetup]:
+        """The limit switches of each motor: whether they stop it (axis parameters 12 and 13)."""
+        return [
+            PointSetup(f"{number}{f'_{motor}' if motor else ''}", f"{side} limit switch of motor {motor}", (STOPS,))
+            for motor in range(self.state.motors or 1)
+            for number, side in ((12, "right"), (13, "left"))
+        ]
