@@ -179,3 +179,10 @@ def test_values_that_go_on_rising_change_the_scale_seldom() -> None:
 
 def test_headroom_never_makes_a_scale_much_wider_than_the_values_need() -> None:
     assert steady(None, 0, 600_000, 7, 100) == nice_scale(0, 600_000, 7, 100)
+
+
+def test_lines_that_come_faster_than_columns_are_one_mark_in_each(session: FakeSession) -> None:
+    many = [sent(session, 20 - n / 50, f"MR {n}") for n in range(1000)]
+    rows = charts(view(session, *climb(session), *many))
+    columns = ["".join(column).count("›") for column in zip(*(row.ljust(50) for row in rows[2:-1]), strict=True)]
+    assert max(columns) == 1 and sum(columns) > 35

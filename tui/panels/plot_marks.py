@@ -130,14 +130,12 @@ def _put_marks(marked: MarkedChart, cells: _Cells) -> None:
     placed: dict[tuple[int, int], tuple[PlotMark, str]] = {}
     for line in lines:
         whose = f"{line.short} " if len({each.name for each in lines}) > 1 else ""
-        for mark in marks_of(view, line, lines, begin, end):
+        for x, mark in _by_column(marks_of(view, line, lines, begin, end), window).items():
             value = _value_at(marked, line, mark.at)
-            x = int(mark.at // window.dot) // window.wide - window.first
-            if value is None or not 0 <= x < window.columns:
+            if value is None:
                 continue
             y = row_of(line.conversion.value(value), marked.scale, height)
-            before = placed.get((x, y))
-            if before is None or URGENCY[mark.kind] <= URGENCY[before[0].kind]:
+            if (x, y) not in placed or URGENCY[mark.kind] <= URGENCY[placed[x, y][0].kind]:
                 placed[x, y] = mark, whose
     for (x, y), (mark, _) in placed.items():
         cells.put(x, y, sign_of(view, mark.kind), MARK if mark.kind is MarkKind.SENT else ALARM)
@@ -148,6 +146,16 @@ def _put_marks(marked: MarkedChart, cells: _Cells) -> None:
             if cells.free(left, row, len(text)):
                 cells.put(left, row, text, MARK if mark.kind is MarkKind.SENT else ALARM)
                 break
+
+
+def _by_column(marks: Sequence[PlotMark], window: ColumnWindow) -> dict[int, PlotMark]:
+    """The most urgent mark in each column of cells, and of equal ones the newest."""
+    found: dict[int, PlotMark] = {}
+    for mark in marks:
+        x = int(mark.at // window.dot) // window.wide - window.first
+        if 0 <= x < window.columns and (x not in found or URGENCY[mark.kind] <= URGENCY[found[x].kind]):
+            found[x] = mark
+    return found
 
 
 def _value_at(marked: MarkedChart, line: PlottedLine, at: float) -> float | None:

@@ -108,7 +108,7 @@ def _braille(halves: str) -> dict[int, str]:
     return {code: halves[bool(code & UPPER) + 2 * bool(code & LOWER)] for code in BRAILLE}
 
 
-_RARE = "‼! □_ ┊: ┄. ◇+ ≠! −- ✗x ✓v ●* ◉* ○o □o ›> …~ –- —- ▏| ▎| ▍| ▕| ╴- ╶- ╵| ╷|"
+_RARE = "‼! ↵< □_ ┊: ┄. ◇+ ≠! −- ✗x ✓v ●* ◉* ○o □o ›> …~ –- —- ▏| ▎| ▍| ▕| ╴- ╶- ╵| ╷|"
 TABLES: Mapping[Signs, Mapping[int, str]] = {
     Signs.FULL: {},
     Signs.BOXES: _pairs(f"{_RARE} ▶► ▷» ▸► ◀◄ ◂◄ ╭┌ ╮┐ ╰└ ╯┘ ▁_ ▂▄ ▃▄ ▅▄ ▆█ ▇█ ▔▀") | _braille(" ▀▄█"),
