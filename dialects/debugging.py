@@ -41,6 +41,11 @@ class Debugging(OfDrive, ABC):
     no_break: ClassVar[str] = ""
     """The reason why they have no break points; empty: they have."""
 
+    @property
+    def cannot_step(self) -> str:
+        """The reason why this drive has no single step, with its present settings too; empty: it has."""
+        return self.no_step
+
     def lacking(self, what: str) -> Procedure[Any]:
         """The conversation that stands for what the drives lack. Raises Inexpressible."""
         raise Inexpressible(f"{who(self.state)}: {what}; nothing was sent")

@@ -116,7 +116,7 @@ async def test_a_job_takes_no_more_keys_than_were_agreed_on(name: str) -> None:
         assert job.done(app, session), (session.sent, app.screen)
 
 
-async def test_a_file_is_downloaded_with_two_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_file_is_downloaded_with_three_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("a.mxt").write_text("PG 1\nLB G1\nH 100\nE\nPG\n")
     session = demo_session()
@@ -125,7 +125,7 @@ async def test_a_file_is_downloaded_with_two_keys(tmp_path: Path, monkeypatch: p
         app.texts.open("a.mxt")
         await press(pilot, "ctrl+e")
         assert isinstance(app.screen, ProgramPage)
-        await press(pilot, "ctrl+d", "enter")
+        await press(pilot, "ctrl+d", "s", "enter")
         for _ in range(20):
             await asyncio.sleep(0)
         assert [line for line, _ in session.lines] == ["/download a.mxt press:a"]

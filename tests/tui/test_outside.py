@@ -19,11 +19,11 @@ from multidrop.shell.programs.edited_file import EditedFile, Outside
 from multidrop.shell.state.backups import Copy, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens import program_file
-from multidrop.tui.screens.dialogs import Confirm, SearchDialog
+from multidrop.tui.screens.dialogs import ChoiceList, Confirm, SearchDialog
 from multidrop.tui.screens.macros import MacrosPage
 from multidrop.tui.screens.parameters import ParametersPage
 from multidrop.tui.screens.program import ProgramPage
-from tests.support.fake_session import FakeAssist, FakeSession, demo_session, on_screen, settle
+from tests.support.fake_session import FakeAssist, FakeSession, demo_session, on_screen, settle, toasts
 from tests.support.real_screen import real_screen, until
 from tests.support.until import PATIENCE
 
@@ -120,8 +120,8 @@ async def test_an_unchanged_file_is_downloaded_without_a_note_or_another_questio
         os.utime("a.mxt", (1, 1))  # touched: its content is as it was
         typed(pilot, "ctrl+d")
         asked = await question(pilot, "Download a.mxt")
-        assert not [line for line in asked.lines if line.startswith("!")] and len(asked.answers) == 3
-        typed(pilot, "enter")
+        assert not [line for line in asked.lines if line.startswith("!")] and len(asked.answers) == 4
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, TEXT)])
         assert not told(pilot, "on the disk") and (folder / "a.mxt").read_text() == TEXT
 
@@ -131,7 +131,7 @@ async def test_a_download_sends_the_text_on_the_screen_whatever_the_disk_has_by_
         typed(pilot, "ctrl+d")
         await question(pilot, "Download a.mxt")
         (folder / "a.mxt").write_text(OTHER)
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, TEXT)])
         assert (folder / "a.mxt").read_text() == OTHER  # and nothing of another program's is overwritten
 
@@ -151,32 +151,47 @@ async def test_a_download_of_a_file_that_changed_shows_the_new_text_first(folder
         typed(pilot, "ctrl+d")
         asked = await question(pilot, "Download a.mxt")
         assert not asked.lines[0].startswith("!")
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, OTHER)])
 
 
-async def test_what_is_said_of_a_download_is_said_of_the_text_that_is_sent(folder: Path) -> None:
+async def test_a_text_with_errors_is_not_offered_for_a_download(folder: Path) -> None:
     async with page(folder) as pilot:
         typed(pilot, "ctrl+home", "K9\n", "ctrl+d")  # in one read: no check has come between
+        words = "a.mxt has 1 error, so nothing is sent; ^F goes to the next error"
+        await until(pilot, lambda: words in "".join(toasts(pilot.app)))  # type: ignore[arg-type]
+        assert isinstance(pilot.app.screen, ProgramPage) and sent(pilot) == []
+
+
+async def test_the_question_before_a_download_shows_each_line_whole_and_its_first_answer_sends_nothing(
+    folder: Path,
+) -> None:
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+d")
         asked = await question(pilot, "Download a.mxt")
-        assert any("1 error: it will be refused" in line for line in asked.lines)
-        typed(pilot, "escape")
-        (folder / "a.mxt").write_text("K9\n")
-        shown(pilot).editor.text = "K9\n"
-        typed(pilot, "ctrl+s", "ctrl+d")
-        asked = await question(pilot, "Download a.mxt")
-        assert any("it will be refused" in line for line in asked.lines)
-        (folder / "a.mxt").write_text(TEXT)  # mended by another program: not what is shown
+        options = asked.query_one(ChoiceList)
+        rows = [options.render_line(y).text.strip() for y in range(options.size.height)]
+        assert rows == [
+            "Cancel, send nothing",
+            "Send it",
+            "/download a.mxt press:a",
+            "Send it; keep it at power-off",
+            "/download a.mxt press:a --save",
+            "Send it, only if it differs",
+            "/download a.mxt press:a --only-changed",
+        ]
+        assert options.highlighted == 0
         typed(pilot, "enter")
-        await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, "K9\n")])
+        await until(pilot, lambda: isinstance(pilot.app.screen, ProgramPage))
+        assert sent(pilot) == []
 
 
 async def test_an_edited_text_is_saved_and_sent_as_it_was_shown(folder: Path) -> None:
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' mine", "ctrl+d")
         asked = await question(pilot, "Download a.mxt")
-        assert "Save the file" in asked.answers[0][1]
-        typed(pilot, "enter")
+        assert "Save the file" in asked.answers[1][1]
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, TEXT + "' mine")])
         assert (folder / "a.mxt").read_text() == TEXT + "' mine"
 
@@ -197,11 +212,11 @@ async def test_a_text_edited_here_and_elsewhere_is_a_question_before_a_download(
         asked = await question(pilot, "Download a.mxt")  # it is asked once
         if answer == "read":
             assert shown(pilot).editor.text == OTHER
-            typed(pilot, "enter")
+            typed(pilot, "down", "enter")
             await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, OTHER)])
             return
         assert "! The file has changed on the disk" in asked.lines[0]
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         asked = await question(pilot, "Save?")
         assert "Nothing was saved or sent" in asked.lines[1]
         typed(pilot, "down", "enter")
@@ -259,7 +274,7 @@ async def test_what_another_program_saved_here_is_the_text_that_was_typed_here(f
         (folder / "a.mxt").write_text(TEXT + "' mine")
         typed(pilot, "ctrl+d")
         asked = await question(pilot, "Download a.mxt")
-        assert asked.answers[0][1].startswith("Send it ")  # nothing to save
+        assert asked.answers[1][1].startswith("Send it\n")  # nothing to save
 
 
 def a_folder(path: Path) -> None:
@@ -281,7 +296,7 @@ async def test_a_text_outlives_its_file(folder: Path, act: Callable[[Path], None
         typed(pilot, "ctrl+d")
         await question(pilot, "Download a.mxt")
         assert told(pilot, note) == 1 and shown(pilot).editor.text == TEXT
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: sent(pilot) == [(DOWNLOAD, TEXT)])
         assert not (folder / "a.mxt").is_file() or (folder / "a.mxt").read_bytes() in (b"\0", TEXT.encode())
 
@@ -361,7 +376,7 @@ async def test_a_stop_while_the_file_is_saved_keeps_the_download_back(
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' mine", "ctrl+d")
         await question(pilot, "Download a.mxt")
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: isinstance(pilot.app.screen, ProgramPage))
         typed(pilot, "ctrl+x")
         await until(pilot, lambda: session_of(pilot).stops == 1)
@@ -416,7 +431,7 @@ async def test_the_drive_holds_the_program_that_was_on_the_screen(folder: Path) 
         typed(pilot, "ctrl+d")
         await question(pilot, "Download a.mxt")
         (folder / "a.mxt").write_text(OTHER)
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: told(pilot, "verified, 3 lines"))
         held = app.model.bus("eth").readout(app.session.selected.address).program.lines  # type: ignore[union-attr]
         assert [text.strip() for _, text in held] == ["LB G1", "MR 51200", "E"]

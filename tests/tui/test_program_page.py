@@ -12,13 +12,14 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
+from multidrop.families.lexium.host.mcode.debugging import MCodeDebugging
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.state.backups import Copy, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens.dialogs import Confirm, SearchDialog
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.texts import OpenText
-from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
+from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle, toasts
 from tests.support.real_screen import real_screen, until
 from tests.support.until import PATIENCE
 
@@ -199,7 +200,7 @@ async def test_a_download_is_a_typed_line_after_a_question_and_saves_before(fold
         await settle(pilot)
         await asked(pilot)
         assert sent(pilot) == [] and (folder / "a.mxt").read_text() == TEXT
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: sent(pilot) == ["/download a.mxt press:a"])
         assert (folder / "a.mxt").read_text().endswith("' mine")
 
@@ -213,6 +214,19 @@ async def test_a_program_is_run_or_traced_from_a_label_by_the_line_that_is_shown
         assert len(sent(pilot)) == 1
         typed(pilot, "escape", "ctrl+r", "trace", "enter")
         await until(pilot, lambda: sent(pilot)[1:] == ["/trace press:a G1"])
+
+
+async def test_single_step_is_not_offered_where_the_drive_cannot(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MCodeDebugging, "cannot_step", "single step needs bare keys")
+    async with page(folder) as pilot:
+        typed(pilot, "ctrl+r")
+        await until(pilot, lambda: isinstance(pilot.app.screen, SearchDialog))
+        assert isinstance(pilot.app.screen, SearchDialog)
+        offered = [match.text.plain.split()[0] for match in pilot.app.screen.found]
+        assert "Run" in offered and "Trace" in offered and "Step" not in offered
+        typed(pilot, "escape", "ctrl+t")
+        await until(pilot, lambda: "single step needs bare keys" in "".join(toasts(pilot.app)))  # type: ignore[arg-type]
+        assert sent(pilot) == []
 
 
 async def test_the_line_that_is_executed_and_the_break_point_are_in_the_gutter(folder: Path) -> None:
@@ -336,7 +350,7 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(folder: Path) -
         await until(pilot, lambda: not page.findings.problems and not page.findings.pending)
         typed(pilot, "ctrl+d")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
-        typed(pilot, "enter")
+        typed(pilot, "down", "enter")
         await until(pilot, lambda: len(page.findings.addresses) == 7)
         typed(pilot, "ctrl+r")
         await until(pilot, lambda: isinstance(app.screen, SearchDialog))

@@ -157,7 +157,7 @@ async def test_what_is_next_has_the_macros_on_keys() -> None:
     async with on_screen(width=200, height=50) as (pilot, app, _):
         await settle(pilot)
         side = app.main.lines("side").plain
-        assert "F2           home-all: all axes to their switches" in side and "F3           plays shuttle" in side
+        assert re.search(r"F2 +home-all: all axes to their switches", side) and re.search(r"F3 +plays shuttle", side)
 
 
 def test_a_program_that_is_not_known_gives_its_room_away() -> None:

@@ -339,7 +339,12 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
     rate = axis.conditions.speed_unit if axis.conditions is not None else f"{unit}/s"
     speed: list[Span] = [(velocity, role), (f" {'' if figures.speed_unit else f'{rate} '}", "dim")]
     rows: list[Row] = [spread(_state(glance, axis, now, width - width_of(speed) - 1), speed, width)]
-    rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
+    for text, role_of in _troubles(axis, now):
+        pieces = at_words(text, max(1, width - len(name) - 1))
+        rows += [
+            ((f"{name} {piece}" if not n else f"{' ' * len(name)}   {piece}", role_of),)
+            for n, piece in enumerate(pieces)
+        ]
     if not glance.counts(axis):
         verb = f"/referenced {glance.address}".rstrip()
         rows.append(((f"{name} {NOT_REFERENCED}: home it, set it, or {verb}", "strong"),))

@@ -20,7 +20,7 @@ from multidrop.tui.widgets.lines import Row
 
 WORD = 10
 """Width of the word before a fact."""
-KEY = 12
+KEY = 13
 """Width of a key, or of a line to type; few are longer."""
 MOST_OFFERED = 3
 """Things that are offered as next."""

@@ -160,7 +160,8 @@ class Ask(Dialog[str]):
 class Confirm(Dialog[str]):
     """A question with a few answers, each with its key; Escape returns None.
 
-    A letter highlights the next answer that begins with it. One that begins none leaves nothing to take.
+    The first answer, which does nothing, is highlighted. A letter highlights the next answer that begins with it. One
+    that begins none leaves nothing to take. An answer may have several rows.
     """
 
     SHEET = "answers"
@@ -176,7 +177,8 @@ class Confirm(Dialog[str]):
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
-            yield ChoiceList([text for _, text in self.answers], self._taken)
+            rows = [Text("\n".join(map(visible, text.split("\n"))), overflow="fold") for _, text in self.answers]
+            yield ChoiceList(rows, self._taken)
             yield Hint(hint("answers"))
 
     def begin(self) -> None:

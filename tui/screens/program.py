@@ -31,7 +31,6 @@ from multidrop.tui.screens.dialogs import Ask, Confirm, ListedChoice, SearchDial
 from multidrop.tui.screens.page import Page, PageHost, start
 from multidrop.tui.screens.program_file import FileOnDisk, FileOnScreen
 from multidrop.tui.screens.program_rows import (
-    LOOK_FIRST,
     MOST_PROBLEMS,
     UPLOAD,
     Finder,
@@ -39,6 +38,7 @@ from multidrop.tui.screens.program_rows import (
     Unit,
     download_choices,
     download_facts,
+    download_trouble,
     examined,
     files_in,
     heading_row,
@@ -317,6 +317,9 @@ class ProgramPage(Page):
         if not isinstance(self.grammar, ProgramGrammar):
             self.notify(f"{text.name} is not a program: nothing to download")
             return
+        if not chosen.family.offers("programs"):
+            self.notify(f"Nothing was sent: {chosen.family.no_programs}")
+            return
         self.host.keyboard.hold(self)  # keys are for the question
         self.run_worker(self._ask_download(text, chosen.product, self.host.session.stops))
 
@@ -331,15 +334,18 @@ class ProgramPage(Page):
                 return
             target, shown, outside = target_of(self.host.session), text.text, self.file.outside
             again = self.file.news.words if seen is FileOnDisk.READ else ""
-            facts = download_facts(text, findings, self.program, outside, again)
+            if trouble := download_trouble(text, findings):
+                self.notify(trouble)
+                return
+            facts = download_facts(self.program, outside, again)
 
             def answered(line: str | None) -> None:
                 if line:
                     self.run_worker(self._download(line, text, shown, self.host.session.stops))
 
             title = f"Download {text.name} to {target or product}?"
-            answers = [(choice.line, f"{choice.title:<38} {choice.line}") for choice in download_choices(text, target)]
-            answers = [LOOK_FIRST, *answers] if again else answers
+            choices = download_choices(text, target, bool(again))
+            answers = [(choice.line, f"{choice.title}\n   {choice.line}".rstrip()) for choice in choices]
             await self.app.push_screen(Confirm(title, facts, answers), answered)
         finally:
             self.host.keyboard.release(self)
@@ -359,7 +365,7 @@ class ProgramPage(Page):
             return
         program = self.program
         await self._look_at_text()
-        choices = run_choices(self._entries(), target_of(self.host.session), program)
+        choices = run_choices(self._entries(), target_of(self.host.session), program, chosen.family.debugging)
         choices = [choice for choice in choices if only in choice.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
         heading = f"{title} {target_of(self.host.session) or chosen.product}: its program {known}"
@@ -378,8 +384,10 @@ class ProgramPage(Page):
         if self._step is not None and not self._step.done():
             self.notify("The step before is not done yet", timeout=2)
             return
-        program = self.program
-        if program.line is not None and program.phase.waits:
+        program, chosen = self.program, self.host.session.selected
+        if chosen is not None and (debugging := chosen.family.debugging) is not None and debugging.cannot_step:
+            self.notify(f"Nothing was sent: {debugging.cannot_step}; ^R traces a program instead")
+        elif program.line is not None and program.phase.waits:
             self._step = start(self, with_target("/step", target_of(self.host.session)))
         else:
             await self._choose("/step ", "Step in")

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from rich.text import Text
 
 from multidrop.base.text import counted
+from multidrop.dialects.debugging import Debugging
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import LinePart, Problem, ProgramEntry, errors, in_order
 from multidrop.shell.line_syntax import join_target
@@ -223,33 +224,38 @@ def _match(name: str, about: str) -> Match:
 # Download
 
 
-LOOK_FIRST = ("", "Send nothing, look at the new text")
-"""The first answer where the text on the screen has just been read again."""
+def download_choices(text: OpenText, target: str, again: bool) -> list[Choice]:
+    """Return the answers to the question before a download; the first one sends nothing.
 
-
-def download_choices(text: OpenText, target: str) -> list[Choice]:
+    `again`: the text on the screen has just been read again.
+    """
     file = shlex.quote(text.name)
     first = "Save the file and send it" if text.changed or text.file.new else "Send it"
     return [
+        Choice("Cancel, and look at the new text" if again else "Cancel, send nothing", ""),
         Choice(first, with_target("/download", file, target)),
         Choice(f"{first}; keep it at power-off", with_target("/download", file, target, "--save")),
-        Choice(f"{first} unless the drive holds it", with_target("/download", file, target, "--only-changed")),
+        Choice(f"{first}, only if it differs", with_target("/download", file, target, "--only-changed")),
     ]
 
 
-def download_facts(
-    text: OpenText, findings: Findings, program: ProgramFacts, outside: str = "", again: str = ""
-) -> list[str]:
-    """The facts before a download: errors, the fate of the program in the drive, and what other programs did.
+def download_trouble(text: OpenText, findings: Findings) -> str:
+    """Return why a text would not be downloaded, in one line; empty: it would."""
+    wrong = len(errors(findings.problems))
+    if not wrong:
+        return ""
+    return f"{visible(text.name)} has {counted(wrong, 'error')}, so nothing is sent; ^F goes to the next error"
+
+
+def download_facts(program: ProgramFacts, outside: str = "", again: str = "") -> list[str]:
+    """Return the facts before a download: what becomes of the program in the drive, and what other programs did.
 
     `again`: where the text that was read again just now is new. `outside`: what became of the file, while its text
     stays on the screen.
     """
-    wrong = len(errors(findings.problems))
     lines = [f"! The file has changed on the disk and was read again. {again}."] if again else []
     if outside:
         lines.append(f"! The file {outside}; the text on the screen is sent.")
-    lines += [f"✗ {counted(wrong, 'error')}: it will be refused, and nothing is sent"] if wrong else []
     if program.line is not None:
         lines.append("its program runs: it is ended first")
     return [*lines, "What the drive holds is read and saved to a backup first, then replaced."]
@@ -258,14 +264,24 @@ def download_facts(
 # Run
 
 
-def run_choices(entries: Sequence[ProgramEntry], target: str, program: ProgramFacts) -> list[Choice]:
-    """Ways to run a program, and what else can be done while one runs or waits."""
+def run_choices(
+    entries: Sequence[ProgramEntry], target: str, program: ProgramFacts, debugging: Debugging | None
+) -> list[Choice]:
+    """Return the ways to run a program, and what else can be done while one runs or waits.
+
+    What the drive would refuse is left out; `debugging` is what observes its programs, None: nothing does.
+    """
     start = f"@{target} " if target else ""
+    steps = debugging is not None and not debugging.cannot_step
     choices: list[Choice] = []
-    if program.line is not None:
+    if program.line is not None and steps:
         choices.append(Choice("Go on at normal speed", with_target("/continue", target)))
+    if program.line is not None and debugging is not None and steps and not debugging.no_break:
         choices.append(Choice("Break it where it is", with_target("/break", target, "now")))
-    for verb, what in (("", "Run from"), ("/trace", "Trace from"), ("/step", "Step by step from")):
+    ways = [("", "Run from")]
+    ways += [("/trace", "Trace from")] if debugging is not None else []
+    ways += [("/step", "Step by step from")] if steps else []
+    for verb, what in ways:
         for entry in entries:
             line = with_target(verb, target, entry.name) if verb else f"{start}{entry.start}"
             choices.append(Choice(f"{what} {entry.name}", line))

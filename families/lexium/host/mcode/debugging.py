@@ -113,14 +113,18 @@ def _checked(place: str) -> str:
     return place
 
 
+def _no_keys(state: MCodeState) -> str:
+    """Return why no key of single step is sent, where the manual does not say how the drive takes it; empty: it is."""
+    if not state.codec.party and not state.codec.checksum:
+        return ""
+    mode = "in party mode" if state.codec.party else "with a checksum"
+    return f"single step needs bare keys, and the manual does not say how a drive takes them {mode}"
+
+
 def _check_keys(state: MCodeState) -> None:
     """Raise Inexpressible where the manual does not say how the drive takes a key."""
-    if state.codec.party or state.codec.checksum:
-        mode = "in party mode" if state.codec.party else "with a checksum"
-        raise Inexpressible(
-            f"{who(state)}: single step needs bare keys, and the manual does not say how a drive takes them {mode}; "
-            "nothing was sent; set PY=0 and CK=0, or trace it"
-        )
+    if reason := _no_keys(state):
+        raise Inexpressible(f"{who(state)}: {reason}; nothing was sent; set PY=0 and CK=0, or trace it")
 
 
 def _check_steps(state: MCodeState) -> None:
@@ -165,6 +169,11 @@ class MCodeDebugging(Debugging):
     """Observes the program of an MCode drive."""
 
     state: MCodeState
+
+    @property
+    def cannot_step(self) -> str:
+        """The reason why no key of single step is sent to it with its present settings; empty: one is."""
+        return _no_keys(self.state)
 
     def listing(self) -> Procedure[tuple[Stored, ...]]:
         """Read the program in the drive. LK is read first: a refusal would run an OE subroutine."""
