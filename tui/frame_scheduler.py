@@ -54,7 +54,8 @@ class Frames:
     def wake(self, panels: bool = True) -> None:
         """Paint soon: something has happened. `panels`: it may be more than a record."""
         self._panels_owed = self._panels_owed or panels
-        self._begin_at(self._painted_at + 1 / FRAMES)
+        skipped = not panels and self._behind()  # records that wait are shown by a later frame: every second is enough
+        self._begin_at(self._painted_at + (1 + skipped) / FRAMES)
 
     def follow(self) -> None:
         """Paint values that have changed, with the next frame that paints all: nothing else has come."""

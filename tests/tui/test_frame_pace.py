@@ -84,7 +84,8 @@ class Painted:
     """Frames that are painted at once, and what each of them was."""
 
     def __init__(self):
-        self.frames = Frames(self.paint, self.later, lambda: False)
+        self.behind = False
+        self.frames = Frames(self.paint, self.later, lambda: self.behind)
         self.times: list[tuple[int, str]] = []
         """Milliseconds, and `all` or `records`."""
         self.begin = asyncio.get_running_loop().time()
@@ -141,3 +142,13 @@ async def test_lines_are_painted_thirty_times_a_second_and_all_with_every_third(
         await asyncio.sleep(0.005)
     assert 28 <= len(painted.times) <= 32
     assert 9 <= [what for _, what in painted.times].count("all") <= 11
+
+
+@pytest.mark.virtual
+async def test_while_lines_wait_for_a_later_frame_only_every_second_one_is_begun():
+    painted = Painted()
+    painted.behind = True
+    for _ in range(200):
+        painted.frames.wake(panels=False)
+        await asyncio.sleep(0.005)
+    assert 14 <= len(painted.times) <= 16
