@@ -15,10 +15,16 @@ from multidrop.tui.keymap import Keymap
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row
 
+FILE_HEADING = "Program file; with / a folder"
+"""The heading of the dialog that asks for a program file."""
 LINE = "press"
 """The line of the demo cell that it is on."""
 TOUR_ROWS = 3
 """Height of the tour: its step in words, and how to end it."""
+
+
+KEYS = ("page-drives", "page-controls", "page-plot", "page-program", "page-macros", "palette", "help")
+"""The functions whose keys the steps name."""
 
 
 class TourStep(NamedTuple):
@@ -26,13 +32,20 @@ class TourStep(NamedTuple):
 
     words: str
     until: str
-    """`typed LINE`: a line was sent that begins so; `shown NAME`: that dialog or screen is in front."""
+    """`typed LINE`: a line was sent that begins so. `shown NAME | NAME`: one of these dialogs or screens is in front.
+
+    `recording`, `recorded`: a macro is being recorded, or no longer. `stopped`, `resumed`: there was a stop, or it is
+    over.
+    """
 
 
 STEPS = (
     TourStep("Drive a answers in its own language. Type PR P and press Enter: it prints its position.", "typed PR P"),
     TourStep(
         "Now a move: type MR 512000 and press Enter. Its row shows the travel and what is left of it.", "typed MR"
+    ),
+    TourStep(
+        "The same in units: MR {12.5 mm} and Enter. The drive gets steps, which the transcript shows.", "typed MR {"
     ),
     TourStep("Another drive of the same line: @b PR P goes to drive b, whatever is selected.", "typed @B"),
     TourStep("{page-drives} shows all drives of all lines, the worst first.", "shown AllDrives"),
@@ -42,6 +55,19 @@ STEPS = (
     TourStep(
         "STOPPED below the tabs means: velocity 0 was read from every drive. Macros and scripts wait: type /resume.",
         "resumed",
+    ),
+    TourStep(
+        "{page-controls} moves a drive by keys, step by step. Look at it, then press Escape.", "shown ControlsPage"
+    ),
+    TourStep("{page-plot} draws its curves. Look at them, then press Escape.", "shown PlotPage"),
+    TourStep(
+        "{page-program} edits, checks and downloads programs. It first asks for a file: press Escape twice.",
+        f"shown ProgramPage | {FILE_HEADING}",
+    ),
+    TourStep("Record a macro: type /record tour --replace and press Enter.", "recording"),
+    TourStep("What you type now is kept. Type MR 51200 and Enter, then /record stop and Enter.", "recorded"),
+    TourStep(
+        "{page-macros} lists your macros: Enter plays one, {page-macros} there puts it on a key.", "shown MacrosPage"
     ),
     TourStep("{palette} finds everything by name. Open it, look, and close it with Escape.", "shown Everything"),
     TourStep("{help} is help for where you are. Open it and type a word, then Escape.", "shown Help"),
@@ -96,7 +122,9 @@ class Tour:
             case "typed":
                 return any(line.startswith(text) for line in self._lines)
             case "shown":
-                return self._front() == text
+                return self._front() in text.split(" | ")
+            case "recording" | "recorded":
+                return bool(self._session.recording) is (what == "recording")
             case "stopped":
                 return self._session.stops != self._stops
             case _:
@@ -119,6 +147,6 @@ class Tour:
         if self._session.selected_bus != self.bus:
             return f"Lines go to {self._session.selected_bus} now. The tour goes on on {self.bus}: type /use {self.bus}"
         words = STEPS[self._at].words
-        for name in ("page-drives", "palette", "help"):
-            words = words.replace(f"{{{name}}}", self._keys.shown(name) or f"/{name}")
+        for name in KEYS:
+            words = words.replace(f"{{{name}}}", self._keys.shown(name) or f"/{name.replace('page-', 'page ')}")
         return words

@@ -271,7 +271,7 @@ Escape goes back. A name that is not a page is answered with the names of all.
         fits=conditions.has_screen,
         immediate=True,
         help="""
-Walk through the product in two minutes, on the demo cell.
+Walk through the product in three minutes, on the demo cell.
 
 Each step names what to type or press, and goes on when it was done. Escape ends the tour.
 """,

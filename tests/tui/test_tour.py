@@ -20,6 +20,7 @@ async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
             [
                 (*"pr p", "enter"),
                 (*"MR 512000", "enter"),
+                (*"MR {12.5 mm}", "enter"),
                 (*"@b PR P", "enter"),
                 ("ctrl+a",),
                 ("escape",),
@@ -31,14 +32,24 @@ async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
             await pilot.press(*keys)
             assert await step() == number
         session.resume()
-        assert await step() == 9
-        await pilot.press("ctrl+p")
         assert await step() == 10
+        for number, keys in enumerate([("ctrl+n",), ("escape", "ctrl+g"), ("escape", "ctrl+e")], 11):
+            await pilot.press(*keys)
+            assert await step() == number
+        await pilot.press("escape", "escape")
+        for recording, number in (("tour", 14), ("", 15)):
+            session.recording = recording
+            app.model.changed = True
+            assert await step() == number
+        await pilot.press("ctrl+k")
+        assert await step() == 16
+        await pilot.press("escape", "ctrl+p")
+        assert await step() == 17
         assert "is help for where you are" in app.main.lines("tour").plain
         await pilot.press("escape", "f1")
         await step()
         await pilot.press("escape")
-        assert await step() == 10 and "That was the tour" in app.main.lines("tour").plain
+        assert await step() == 17 and "That was the tour" in app.main.lines("tour").plain
         await press(pilot, "escape")
         assert not app.tour.on and not app.main.lines("tour").display
 

@@ -160,8 +160,8 @@ class Ask(Dialog[str]):
 class Confirm(Dialog[str]):
     """A question with a few answers, each with its key; Escape returns None.
 
-    The first answer, which does nothing, is highlighted. A letter highlights the next answer that begins with it. One
-    that begins none leaves nothing to take. An answer may have several rows.
+    The first answer is highlighted. A letter highlights the next answer that begins with it. One that begins none
+    leaves nothing to take. An answer may have several rows.
     """
 
     SHEET = "answers"

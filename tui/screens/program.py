@@ -52,6 +52,7 @@ from multidrop.tui.screens.program_rows import (
     with_target,
 )
 from multidrop.tui.texts import OpenText
+from multidrop.tui.tour import FILE_HEADING
 
 CHECK_DELAY = 0.4
 """Seconds without an edit after which a text is checked, and its copy is kept."""
@@ -255,7 +256,7 @@ class ProgramPage(Page):
         selected = self.host.session.selected
         drive = "" if selected is None else target_of(self.host.session) or selected.product
         find = Finder(files, self.host.texts.unsaved(), drive, folder)
-        heading = f"Program file in {folder}" if folder else "Program file; with / a folder"
+        heading = f"Program file in {folder}" if folder else FILE_HEADING
         await self.app.push_screen(SearchDialog(heading, find, "open"), self._open)
 
     async def _open(self, name: str | None) -> None:

@@ -25,7 +25,7 @@ from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
 
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
-TOUR = StartEntry("demo", "the tour", "tour", "two minutes through it, on the demo cell")
+TOUR = StartEntry("demo", "the tour", "tour", "three minutes through it, on the demo cell")
 KINDS = (
     ("wrong", "Wrong in the configuration"),
     ("typed", "Typed"),
