@@ -27,7 +27,7 @@ class Control:
     absent: str = ""
     """The reason for which the family has no such control; it has no lines then."""
 
-    def filled(self, by: int = 0, to: int = 0) -> tuple[str, ...]:
+    def filled(self, by: int | str = 0, to: int | str = 0) -> tuple[str, ...]:
         return tuple(line.format(by=by, to=to) for line in self.lines)
 
     def shown(self, by: str = "", to: str = "") -> str:

@@ -169,6 +169,10 @@ class FakeUnits(SessionUnits):
     def of(self, drive: Any, axis: str = "") -> ScaledAxis | None:
         return self.given_axes.get((drive.address, axis))
 
+    @property
+    def own(self) -> tuple[str, ...]:
+        return ()
+
     def referenced(self, drive: Any, axis: str) -> bool:
         return not drive.unreferenced & {axis, ""}
 

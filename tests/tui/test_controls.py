@@ -17,7 +17,8 @@ from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
 from multidrop.tui.readout import Readout, ReadoutState
-from multidrop.tui.screens.controls import ControlsPage, Jog
+from multidrop.tui.screens.controls import ControlsPage
+from multidrop.tui.screens.jogging import Jog
 from tests.support.fake_session import FakeSession, demo_session, emit, on_screen, press, settle
 
 at_screen = pytest.mark.tui
@@ -337,3 +338,156 @@ async def test_the_simulated_drive_moves_by_one_step(tmp_path: Path) -> None:
         await until(pilot, lambda: "ready" in pilot.app.screen.lines("controls").plain)  # type: ignore[attr-defined]
         await pilot.press("up", "right")
         await until(pilot, lambda: readout.last is not None and readout.last[1:] == (1000, 0))
+
+
+# Amounts in units
+
+
+@at_screen
+async def test_a_step_in_millimetres_is_sent_as_one_and_shown_in_steps_too() -> None:
+    session = demo_session()
+    session.units.give("a", "5 mm/turn")
+    async with on_screen(session) as (pilot, _, _):
+        page = await opened(pilot, session)
+        assert "100 steps = " in page.lines("controls").plain
+        await press(pilot, "l", *"1mm", "enter")
+        assert page.step == "1 mm"
+        assert "jog  1 mm = 10240 steps" in page.lines("controls").plain
+        assert "MR {-1 mm}" in page.lines("controls").plain and "MR {1 mm}" in page.lines("controls").plain
+        await press(pilot, "up", "right")
+        assert session.sent == ["press:a MR {10 mm}"]
+        await press(pilot, "down", "down")
+        assert page.step == "0.1 mm"
+
+
+@at_screen
+async def test_a_target_in_millimetres_is_shown_while_it_is_typed_and_sent_as_one() -> None:
+    session = demo_session()
+    session.units.give("a", "5 mm/turn")
+    async with on_screen(session) as (pilot, _, _):
+        page = await opened(pilot, session)
+        await press(pilot, "m")
+        assert "move to a position: mm or steps, such as 1 mm or 10240" in page.lines("asked").plain
+        await press(pilot, *"1", "space", *"mm")
+        assert "→ MA {1 mm}  = 10240 steps" in page.lines("asked").plain
+        assert session.sent == [], "a blank between number and unit is none of the stop's"
+        await press(pilot, "enter")
+        assert session.sent == ["press:a MA {1 mm}"]
+        assert not page.lines("asked").display
+
+
+@pytest.mark.parametrize(
+    ("before", "keys"),
+    [
+        ((), ("m", "space")),
+        ((), ("m", *"1", "space", "space")),
+        ((), ("m", *"1mm", "space")),
+        (("right",), ("m", *"1", "space")),
+    ],
+)
+@at_screen
+async def test_any_other_blank_in_an_entry_is_the_stop(before: tuple[str, ...], keys: tuple[str, ...]) -> None:
+    session = demo_session()
+    async with on_screen(session) as (pilot, _, _):
+        await opened(pilot, session)
+        await press(pilot, *before, *keys)
+        assert session.sent[-1:] == ["press:a SL 0"]
+        session.sent.clear()
+        await press(pilot, *"mm", "enter")
+        assert session.sent == [], "what was begun before the stop is not used"
+
+
+WRONG = (
+    ("1 furlong", "no unit furlong"),
+    ("mm", "mm is no number with a unit"),
+    ("", "nothing was typed"),
+    ("99999999999", "out of range"),
+    ("9000 m", "for the drive"),
+    ("1 mm/s", "is a velocity"),
+)
+
+
+@pytest.mark.parametrize("key", ["l", "m", "b"])
+@pytest.mark.parametrize(("text", "why"), WRONG)
+@at_screen
+async def test_a_wrong_amount_gets_one_line_and_changes_nothing(key: str, text: str, why: str) -> None:
+    session = demo_session()
+    session.units.give("a", "5 mm/turn")
+    async with on_screen(session) as (pilot, _, _):
+        page = await opened(pilot, session)
+        await press(pilot, key)
+        page.field.value = text  # pasted
+        await press(pilot, "enter")
+        said = " ".join(page.lines("said").plain.split())
+        assert said.startswith("nothing was sent: ") and why in said
+        assert (session.sent, page.step) == ([], "100")
+        assert page.asked is not None, "it can be corrected"
+
+
+@at_screen
+async def test_an_axis_without_a_scale_takes_no_unit_and_a_step_in_one_ends_with_the_drive_that_had_it() -> None:
+    session = demo_session()
+    session.units.give("a", "5 mm/turn")
+    async with on_screen(session) as (pilot, _, _):
+        page = await opened(pilot, session)
+        await press(pilot, "l", *"1mm", "enter")
+        session.select("b", "press")
+        await emit(pilot, OnBus("press", Sample(session.time - 0.05, "b", 0, 0)))
+        await settle(pilot)
+        assert page.step == "100"
+        assert "the step is 100 again: 1 mm: the axis has no scale" in page.lines("said").plain
+        assert session.sent == []
+
+
+@pytest.mark.parametrize("key", ["up", "down", "tab", "escape"])
+@at_screen
+async def test_up_down_and_tab_leave_the_entry_and_left_and_right_stay_in_it(key: str) -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        await press(pilot, "m", *"12", "left", "left", "left", "right", "right", "right", "left", *"5")
+        assert page.field.value == "152"
+        await press(pilot, key)
+        assert page.asked is None and not page.field.display
+        await press(pilot, "enter")
+        assert (session.sent, page.step) == ([], "100")
+
+
+@at_screen
+async def test_a_key_that_does_nothing_names_the_keys_that_work() -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        for key in ("x", "q", "7", "question_mark", "Q", "comma"):
+            await press(pilot, key)
+            said = " ".join(page.lines("said").plain.split())
+            assert "does nothing here; " in said and "Space stop" in said, key
+        await press(pilot, "plus")
+        assert "h begins a homing" in page.lines("said").plain
+        await press(pilot, "enter")
+        assert "Enter sends a line that is shown" in page.lines("said").plain
+        await press(pilot, "tab")
+        assert "it has one axis" in page.lines("said").plain
+        assert session.sent == []
+
+
+@at_screen
+async def test_an_enter_that_was_typed_before_the_line_was_shown_is_reported() -> None:
+    async with on_screen() as (pilot, app, session):
+        page = await opened(pilot, session)
+        for key in ("d", "enter"):  # in one read
+            app.post_message(events.Key(key, key if len(key) == 1 else None))
+        await settle(pilot)
+        assert session.sent == []
+        assert "not sent: DE=0: Enter was typed before it was shown" in " ".join(page.lines("said").plain.split())
+        await press(pilot, "enter")
+        assert session.sent == ["press:a DE=0"]
+
+
+def test_a_quantity_stands_where_every_family_takes_one() -> None:
+    for family, axis in (("mcode", ""), ("modbus", ""), ("pmx", "x"), ("tmcl", "")):
+        kind = FAMILIES[family]
+        made = kind(kind.new_state(kind.codec, "a"))
+        target = made.values.controls(axis)[TO].filled(to="{1 mm}")[-1]
+        assert [target[field.start : field.stop] for field in made.units.fields(target)] == ["{1 mm}"], family
+        distance = made.values.controls(axis)[BY].filled(by="{1 mm}", to=90)[-1]
+        found = [distance[field.start : field.stop] for field in made.units.fields(distance)]
+        assert found == (["90"] if family == "pmx" else ["{1 mm}"]), family

@@ -10,108 +10,46 @@ after another one is the keyboard's repetition. What does not count is dropped a
 
 from __future__ import annotations
 
-import math
-import re
-from dataclasses import dataclass
-from string import ascii_letters, digits
+from string import ascii_letters, digits, punctuation
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from multidrop.base.text import counted
-from multidrop.dialects.controls import (
-    BY,
-    DISABLE,
-    ENABLE,
-    HIGH,
-    HOME_MINUS,
-    HOME_PLUS,
-    LOW,
-    STOP,
-    TO,
-    Control,
-    Controls,
+from multidrop.base.errors import Diagnostic
+from multidrop.dialects.controls import BY, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO
+from multidrop.dialects.units import Takes
+from multidrop.shell.amounts import Amount, AmountReader
+from multidrop.tui.key_table import SHEETS, shown_key
+from multidrop.tui.panels.drive import drive_rows
+from multidrop.tui.panels.view import View, name_of
+from multidrop.tui.readout import READ
+from multidrop.tui.screens.chosen_axis import ChosenAxis
+from multidrop.tui.screens.control_entries import ENTRIES, asked_row, moving_lines, read
+from multidrop.tui.screens.control_rows import (
+    KEYED,
+    NO_CONTROLS,
+    SPACE,
+    WORDS,
+    control_rows,
+    jog_rows,
+    readiness,
 )
-from multidrop.tui.panels.drive import drive_rows, unit_of
-from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.readout import READ, Readout, ReadoutState
-from multidrop.tui.screens.page import PageHost, SendingPage
-from multidrop.tui.text import fit
-from multidrop.tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.tui.screens.jogging import Jog
+from multidrop.tui.screens.page import PageHost, SendingPage, show_rows
+from multidrop.tui.text import at_words
+from multidrop.tui.widgets.lines import Row, spread
 
-REPETITION = 0.2
-"""Seconds between two presses below which the second is the repetition of a held key."""
-SETTLE = 0.05
-"""Seconds after the end of a line before a reading shows what the line has done."""
+FIRST_STEP = "100"
+"""The length of a step until a person chooses one, in the drive's own counts."""
 
 
-@dataclass
-class Jog:
-    """The presses of one page."""
-
-    dropped: int = 0
-    """Presses that did not count since the last one that did."""
-    why: str = ""
-    """The reason of the last drop."""
-    _pressed: float = -math.inf
-    _busy: float = -math.inf
-    """When a line was last seen to run or wait."""
-
-    def look(self, now: float, *, idle: bool) -> None:
-        if not idle:
-            self._busy = now
-
-    def allows(self, readout: Readout, axis: Readout, state: ReadoutState, now: float, *, idle: bool) -> bool:
-        """True if a press at this time counts; one that does not is dropped."""
-        self.look(now, idle=idle)
-        repeated = now - self._pressed < REPETITION
-        self._pressed = now
-        self.why = "a key that is held repeats" if repeated else self.obstacle(readout, axis, state, now)
-        if self.why:
-            self.dropped += 1
-            return False
-        self.dropped, self._busy = 0, now
-        return True
-
-    def obstacle(self, readout: Readout, axis: Readout, state: ReadoutState, now: float) -> str:
-        """The reason for which no move may start now; empty: it may."""
-        if state not in READ or axis.last is None:
-            return f"it is {'not read yet' if state is ReadoutState.UNKNOWN else state.word}"
-        if state is ReadoutState.MOVING or axis.last.velocity != 0:
-            return "it moves"
-        if self._busy == now:
-            return "a line is on its way"
-        if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):
-            return "it has not been read at rest since the last line"
-        if axis.conditions is not None and axis.conditions.disabled:
-            return f"no current in the motor ({axis.conditions.disabled})"
-        if axis.conditions is not None and axis.conditions.blocked:
-            return axis.conditions.blocked
-        return "a program runs" if readout.program.name else ""
-
-
-STEPS = tuple(10**n for n in range(8))
-"""The sizes of a step that keys choose."""
-FIRST_STEP = 100
-NUMBERED = {"m": (TO, "position"), "b": (BY, "distance"), "l": ("", "step")}
-"""Keys that ask for a number: the control that takes it, and what it is. An empty name sets the step."""
-SPACE = "space"
-KEYED = {"-": HOME_MINUS, "+": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
-"""Keys of controls. Enter sends them, apart from the stop; a direction counts after `h`."""
-WORDS = {
-    TO: "move to",
-    BY: "move by",
-    HOME_MINUS: "home −",
-    HOME_PLUS: "home +",
-    STOP: "stop",
-    ENABLE: "enable",
-    DISABLE: "disable",
-}
-NO_CONTROLS = "this family has no controls"
-WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
-KEY = 9
-WORD = 10
-LINE = 22
+LEFT = "nothing was sent: the entry was left without Enter"
+KEYS = "; ".join(
+    f"{key.shown} {key.word or key.about.split(':')[0]}" for key in SHEETS["controls"].keys if key.word or key.name
+)
+"""The keys that work, for a person who pressed another one."""
+PRINTED = [*ascii_letters, *digits, *(each for each in punctuation if each != ","), "comma"]
+"""Every key that prints something."""
 
 
 class ControlsPage(SendingPage):
@@ -119,22 +57,26 @@ class ControlsPage(SendingPage):
 
     SHEET = "controls"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding(letter, "drop", show=False) for letter in ascii_letters + digits if letter not in "lmbhed"
+        Binding(key, f"unknown({key!r})", show=False)
+        for key in PRINTED
+        if shown_key(key) not in {shown_key(own) for each in SHEETS["controls"].keys for own, _, _ in each.single}
     ]
     WANTS = frozenset({"motion", "conditions"})
     STOPS = frozenset({"space"})
-    PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
+    PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "asked": 1, "number": None, "said": None}
     FIELD = "number"
 
     def __init__(self, host: PageHost) -> None:
         super().__init__(host)
         self.step = FIRST_STEP
         self._jog = Jog()
-        self._axis = 0
+        self._axis = ChosenAxis(host)
         self._homing = False
         """The next key may be the direction of a homing."""
-        self._place = host.session.place
-        self._view: View | None = None
+        self._before = ""
+        """What the entry held before the last key."""
+        self._void = False
+        """The entry is not used any more: Space stopped the axis while it was open."""
 
     def on_mount(self) -> None:
         """Hide the field until a number is asked for; what failed before is not the page's."""
@@ -145,14 +87,13 @@ class ControlsPage(SendingPage):
 
     def show(self, view: View) -> None:
         """Paint the drive, and the controls with the lines that they send now."""
-        self._view = view
-        # Forget a number that was begun before a stop, or for another drive.
+        # Forget what was begun before a stop, or for another drive.
         place = view.session.place
-        if place != self._place:
-            self._place, self._axis, self._jog = place, 0, Jog()
+        if self._axis.shown(view):
+            self._jog = Jog()
         asked = self.asked
         if asked is not None and asked.overtaken(self.host.session):
-            self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
+            self._close("stopped; the entry was not used" if asked.place == place else "another drive is selected")
         begun = self.begun
         if begun is not None and begun.overtaken(self.host.session):
             self.begun = None
@@ -167,109 +108,93 @@ class ControlsPage(SendingPage):
         right: Row = (("each key press is one move; ^X stops all ", "dim"),)
         self.lines("heading").put([spread([(" CONTROLS   ", "strong"), (name, "accent")], right, width)])
         self.lines("drive").put_all(drive_rows(view, width, max(3, self.size.height - 19)))
-        self.lines("controls").put(self._rows(view, glance, width))
-        self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
+        self._paint_controls(view, width)
+        said: list[Row] = [((f" {row}", self.said[1]),) for row in at_words(self.said[0], width - 2)]
+        show_rows(self.lines("said"), said or [((" ", "text"),)])
         self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
 
-    def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
-        controls = self._controls()
-        if glance is None or not controls:
-            return [((" ^O chooses a drive" if glance is None else f" {NO_CONTROLS}", "dim"),)]
-        axes = glance.readout.axes
-        axis = axes[min(self._axis, len(axes) - 1)]
-        other = "   Tab chooses the axis" if len(axes) > 1 else ""
-        unit = unit_of(axis, glance.unit)
-        head: list[Span] = [
-            ("─ ", "rule"),
-            (f"jog {axis.axis}".rstrip() + "  ", "dim"),
-            (f"{self.step} {unit}", "strong"),
-        ]
-        jog = controls[BY]
-        minus, plus = (self._shown(jog, axis, sign * self.step) for sign in (-1, 1))
-        ready = self._jog.obstacle(glance.readout, axis, glance.state(), view.now)
-        head.append((f"   ↑↓ choose the step, l types it{other} ", "dim"))
-        rows: list[Row] = [
-            (*head, ("─" * max(0, width - width_of(head)), "rule")),
-            ((f" {fit('←', KEY)}", "key"), (fit(minus, WORD + LINE), "text"), (f"→  {plus}", "text")),
-            ((f" {fit('', KEY)}", "text"), self._readiness(ready)),
-            (("─ ", "rule"), ("move ", "dim"), ("─" * max(0, width - 7), "rule")),
-        ]
-        for key, name in ((key, name) for key, (name, _) in NUMBERED.items() if name):
-            rows.append(_control_row(key, name, controls[name], "…", width))
-        for key, name in KEYED.items():
-            rows.append(_control_row(key, name, controls[name], "", width))
-        return rows
+    def _paint_controls(self, view: View, width: int) -> None:
+        controls, chosen, asked = self._axis.controls(), self._axis.now(), self.asked
+        if chosen is None or not controls:
+            nothing = "^O chooses a drive" if chosen is None else NO_CONTROLS
+            self.lines("controls").put([((f" {nothing}", "dim"),)])
+            show_rows(self.lines("asked"), [])
+            return
+        glance, axis = chosen
+        reader = self._axis.reader()
+        why = readiness(self._jog, self._jog.obstacle(glance.readout, axis, glance.state(), view.now))
+        several = len(glance.readout.axes) > 1
+        rows = jog_rows(controls[BY], axis, reader, self._step(reader), several, why, width)
+        self.lines("controls").put([*rows, *control_rows(controls, width)])
+        entry = ENTRIES[asked.kind] if asked is not None else None
+        asks = [asked_row(entry, self.field.value, reader, controls.get(entry.control), axis, width)] if entry else []
+        show_rows(self.lines("asked"), asks)
 
-    def _readiness(self, why: str) -> Span:
-        """True if the next press moves, or why not; with the presses that were dropped."""
-        count = self._jog.dropped
-        presses = counted(count, "press", "presses")
-        dropped = f"; {presses} dropped ({'last: ' * (count > 1)}{self._jog.why})" if count else ""
-        if not why:
-            return f"ready{dropped}", "text" if dropped else "dim"
-        return f"a press is dropped now: {why}{dropped}", "motion" if why == "it moves" else "strong"
-
-    @staticmethod
-    def _shown(control: Control, axis: Readout, by: int) -> str:
-        to = axis.last.position + by if axis.last is not None else None
-        return control.shown(by=str(by), to="…" if to is None else str(to))
+    def _step(self, reader: AmountReader) -> Amount:
+        """The length of a step for an axis. One that the axis cannot have becomes the first one again."""
+        try:
+            return reader.read(self.step, Takes.DISTANCE)
+        except Diagnostic as problem:
+            self.say(f"the step is {FIRST_STEP} again: {problem.message}")
+            self.step = FIRST_STEP
+            return reader.read(FIRST_STEP, Takes.DISTANCE)
 
     # Keys
 
-    def _chosen(self) -> tuple[Glance, Readout] | None:
-        """The selected drive and its chosen axis, as they are now."""
-        glance = self._view.chosen if self._view is not None else None
-        if glance is None or self._place != self.host.session.place:
-            return None
-        axes = glance.readout.axes
-        return glance, axes[min(self._axis, len(axes) - 1)]
-
-    def _controls(self) -> Controls:
-        """The controls of the chosen axis. A drive that is not shown yet has its first axis: its stop does not wait."""
-        session = self.host.session
-        drive = session.selected
-        if drive is None:
-            return {}
-        chosen = self._chosen()
-        first = self.host.model.bus(session.selected_bus).readout(drive.address).axes[0]
-        return drive.family.values.controls(first.axis if chosen is None else chosen[1].axis)
-
-    def _nothing(self) -> str:
-        """Why a key other than the stop does nothing: there is no drive, or the person has not seen it yet."""
-        if self.host.session.selected is None:
-            return "no drive is selected"
-        return (
-            "" if self._chosen() is not None else "nothing was sent: the drive was not shown yet; press the key again"
-        )
-
     def action_step(self, by: int) -> None:
-        self.begun = None
-        larger = [step for step in STEPS if step > self.step]
-        smaller = [step for step in STEPS if step < self.step]
-        steps = larger[:1] if by > 0 else smaller[-1:]
-        self.step = steps[0] if steps else self.step
+        if self._left():
+            return
+        self.begun, chosen = None, self._axis.now()
+        if chosen is None:
+            self.say(self._axis.nothing())
+            return
+        reader = self._axis.reader()
+        before = self._step(reader)
+        try:
+            after = reader.read(before.level(by), Takes.DISTANCE)
+        except Diagnostic as problem:
+            self.say(f"the step stays {before.typed}: {problem.message}")
+        else:
+            ends = f"the step stays {before.typed}: there is no {'longer' if by > 0 else 'shorter'} one"
+            self.say(ends if after == before else "", "strong" if after == before else "dim")
+            self.step = after.typed
+
+    def _left(self) -> bool:
+        """Leave the entry, if one is open; return whether it was."""
+        if self.asked is None:
+            return False
+        self._close(LEFT)
+        return True
 
     def action_axis(self) -> None:
-        self.begun = None
-        chosen = self._chosen()
-        if chosen is not None:
-            self._axis = (self._axis + 1) % len(chosen[0].readout.axes)
+        if self._left():
+            return
+        self.begun, chosen = None, self._axis.now()
+        if chosen is None:
+            self.say(self._axis.nothing())
+        elif len(chosen[0].readout.axes) == 1:
+            self.say("it has one axis")
+        else:
             self._jog = Jog()
+            self.say(f"axis {self._axis.next().axis} is chosen", "dim")
 
     def action_jog(self, sign: int) -> None:
         """Move by one step, if the drive is known to rest; else drop the press."""
-        self.begun = None
-        self._move(BY, sign * self.step)
+        self.begun, chosen = None, self._axis.now()
+        if chosen is None:
+            self.say(self._axis.nothing())
+        else:
+            self._move(BY, self._step(self._axis.reader()).times(sign))
 
     def action_do(self, key: str) -> None:
         """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
         name = KEYED[key]
-        control = self._controls().get(name)
+        control = self._axis.controls().get(name)
         self.begun, self._homing = None, False
         if name == STOP and control is not None and not control.absent:
             self.host.outbox.at_once(control.filled())
             self.say(f"sent: {', '.join(control.filled())}", "dim")
-        elif nothing := self._nothing():
+        elif nothing := self._axis.nothing():
             self.say(nothing)
         elif control is None or control.absent:
             self.say(f"no {WORDS[name]}: {control.absent}" if control is not None else NO_CONTROLS)
@@ -280,24 +205,27 @@ class ControlsPage(SendingPage):
 
     def action_go(self) -> None:
         """Send the control that was begun, unless a stop or another drive came in between."""
-        if self.begun is None and self._homing:
+        if self.begun is None:
             self.action_drop()
+            self.say(f"nothing was sent: Enter sends a line that is shown; {KEYS}")
         elif (begun := self.accepted()) is not None:
             name = KEYED[begun.kind]
             if name in (HOME_MINUS, HOME_PLUS):
-                self._move(name, 0)
-            elif (control := self._controls().get(name)) is not None:
+                self._move(name, None)
+            elif (control := self._axis.controls().get(name)) is not None:
                 self.send(control.filled())
 
     def action_home(self) -> None:
         """Ask for the direction of a homing: one letter begins none."""
         self.action_drop()
-        self._homing = not self._nothing()
-        self.say(self._nothing() or "home: - or + is the direction   Esc: nothing")
+        self._homing = not self._axis.nothing()
+        self.say(self._axis.nothing() or "home: - or + is the direction   Esc: nothing")
 
     def action_toward(self, sign: str) -> None:
         if self._homing:
             self.action_do(sign)
+        else:
+            self.say("nothing was sent: h begins a homing, and + or - is its direction then")
 
     def action_drop(self) -> None:
         """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
@@ -305,58 +233,83 @@ class ControlsPage(SendingPage):
             self.begun, self._homing = None, False
             self.say("nothing was sent")
 
+    def action_unknown(self, key: str) -> None:
+        """Name the keys that work, and drop what waits for Enter."""
+        self.begun, self._homing = None, False
+        self.say(f"nothing was sent: {shown_key(key)} does nothing here; {KEYS}")
+
     def action_ask(self, key: str) -> None:
-        self.begun = None
-        if not self._controls() or self._nothing():
-            self.say(self._nothing() or NO_CONTROLS)
+        self.begun, self._homing = None, False
+        if not self._axis.controls() or self._axis.nothing():
+            self.say(self._axis.nothing() or NO_CONTROLS)
             return
-        self.ask_for(key, "", f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop")
+        self._before, self._void = "", False
+        self.ask_for(key, "", "")
 
     def edited(self, text: str) -> None:
-        """Take a blank, which no number has, as the key of the stop."""
-        if " " in text:
-            self.field.value = text.replace(" ", "")
-            self.action_do(SPACE)
+        """Take a blank as the key of the stop, unless it divides a number from its unit while the axis rests."""
+        before, self._before = self._before, text
+        if len(text) != len(before) + 1 or text.count(" ") <= before.count(" "):
+            return  # pasted, or no blank
+        if before.strip()[-1:].isdigit() and " " not in before and self._rests():
+            return
+        self._before, self._void = before, True
+        self.field.value = before
+        self.action_do(SPACE)
+
+    def _rests(self) -> bool:
+        """Whether the chosen axis is known to rest."""
+        chosen, host = self._axis.now(), self.host
+        if chosen is None:
+            return False
+        glance, axis = chosen
+        now = host.session.now()
+        self._jog.look(now, idle=host.outbox.idle)
+        return not self._jog.restless(glance.readout, axis, glance.state(), now)
 
     def typed(self, text: str) -> None:
-        asked = self.asked
-        if asked is None or asked.overtaken(self.host.session):
-            self._close("the number was not used")
+        asked, chosen = self.asked, self._axis.now()
+        if asked is None or chosen is None or asked.overtaken(self.host.session):
+            self._close("the entry was not used")
             return
-        name, what = NUMBERED[asked.kind]
-        if not WHOLE.fullmatch(text):
-            wrong = f"no {what} {text[:20]}; " if text else ""
-            self.say(f"nothing was sent: {wrong}type a whole number such as -1500")
+        if self._void:
+            self._close("nothing was sent: Space has stopped the axis; type it again")
             return
-        number = int(text)
-        if not LOW <= number <= HIGH or (not name and number <= 0):
-            low = LOW if name else 1
-            self.say(f"nothing was sent: {what} {number} is out of range; valid: {low} to {HIGH}")
+        entry = ENTRIES[asked.kind]
+        try:
+            amount = read(entry, text, self._axis.reader())
+        except Diagnostic as problem:
+            self.say(f"nothing was sent: {problem.message}; {problem.hint}".removesuffix("; "))
             return
         self._close("")
-        if name:
-            self._move(name, number)
+        if entry.control:
+            self._move(entry.control, amount)
         else:
-            self.step = number
+            self.step = amount.typed
+            self.say(f"the step is {amount.typed}", "dim")
 
-    def _move(self, name: str, number: int) -> None:
-        """Start a move, if the drive is known to rest."""
-        chosen, control = self._chosen(), self._controls().get(name)
+    def _move(self, name: str, amount: Amount | None) -> None:
+        """Start a move, if the drive is known to rest; None: it takes no amount."""
+        chosen, control = self._axis.now(), self._axis.controls().get(name)
         if chosen is None or control is None:
-            self.say(self._nothing() or NO_CONTROLS)
+            self.say(self._axis.nothing() or NO_CONTROLS)
             return
         glance, axis = chosen
         host, state = self.host, glance.state()
         if state in READ and axis.last is not None:
             state = axis.own_state
+        number = amount.number if amount is not None else 0
         to = number if name == TO or axis.last is None else axis.last.position + number
         if not LOW <= to <= HIGH:
             self.say(f"not sent: the end of the move, {to}, is out of range")
             return
         if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
             self.say(f"not sent: {self._jog.why}")
-            return
-        self.send(control.filled(by=number, to=to))
+        elif amount is None:
+            self.send(control.filled())
+        else:
+            entry = next(each for each in ENTRIES.values() if each.control == name)
+            self.send(moving_lines(entry, control, axis, amount))
 
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
@@ -371,17 +324,3 @@ class ControlsPage(SendingPage):
         self.end_asking()
         if said:
             self.say(said)
-
-
-def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:
-    """Key, word, lines and meaning of a control; an absent one has its reason."""
-    shown = "Space" if key == SPACE else key if number else f"{'h' if key in '+-' else ''}{key} Enter"
-    if control.absent:
-        text = fit(f"not here: {control.absent}", max(0, width - KEY - WORD - 3))
-        return ((f" {fit('', KEY)}", "dim"), (f"{fit(WORDS[name], WORD)} ", "dim"), (text, "dim"))
-    row: list[Span] = [
-        (f" {fit(shown, KEY)}", "key"),
-        (f"{fit(WORDS[name], WORD)} ", "text"),
-        (fit(control.shown(by=number, to=number), LINE), "strong"),
-    ]
-    return (*row, (fit(control.about, max(0, width - KEY - WORD - LINE - 3)), "dim"))

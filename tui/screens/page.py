@@ -225,6 +225,9 @@ class AskingPage(Page):
 OVERTAKEN = "nothing was sent: a stop or another drive came in between"
 
 
+AGAIN = "look at it, and press Enter again"
+
+
 class SendingPage(AskingPage):
     """A page that shows lines before Enter sends them."""
 
@@ -242,7 +245,10 @@ class SendingPage(AskingPage):
     def accepted(self) -> PendingLines | None:
         """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
         begun = self.begun
-        if begun is None or not self.painted:
+        if begun is None:
+            return None
+        if not self.painted:
+            self.say(f"not sent: {', '.join(begun.lines) or begun.kind}: Enter was typed before it was shown; {AGAIN}")
             return None
         self.begun = None
         if begun.overtaken(self.host.session):
