@@ -40,6 +40,7 @@ OPERATIONS: tuple[str, ...] = (
     "multidrop.shell.verbs.sim",
     "multidrop.shell.verbs.settings",
     "multidrop.shell.verbs.values",
+    "multidrop.shell.verbs.by_hand",
     "multidrop.shell.verbs.programs",
     "multidrop.shell.verbs.macros",
     "multidrop.shell.verbs.waiting",
@@ -81,6 +82,7 @@ DEFAULT = "mcode"
 """The language of drives of which nothing is said."""
 IN_WHEEL: dict[str, tuple[str, ...]] = {
     "certify": ("certify",),
+    "checksums": ("checksum", "/checksum"),
     "convert": ("program convert",),
     "log_analysis": ("log at", "log bisect", "log judge", "log replay"),
     "lsp": ("lsp",),

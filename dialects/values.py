@@ -16,6 +16,7 @@ from typing import ClassVar
 
 from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.text import real
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.controls import NAMES, UNKNOWN, Control, Controls, Homing
 from multidrop.dialects.state import OfDrive, who
@@ -266,6 +267,17 @@ class Pace:
 
 
 @dataclass(frozen=True)
+class SlotState:
+    """The state of one of several programs, by the name of its `by_hand.ProgramSlot`."""
+
+    name: str
+    state: str
+    line: str = ""
+    """Its place, where it runs or waits."""
+    runs: bool = False
+
+
+@dataclass(frozen=True)
 class Conditions:
     """The conditions of one axis of a drive."""
 
@@ -284,6 +296,8 @@ class Conditions:
     """Whether a program runs in the drive that can move it; None: this axis, or the family, does not report it."""
     line: str = ""
     """The place of the running program; empty where the drive does not report it."""
+    slots: tuple[SlotState, ...] = ()
+    """Each program, of a drive that runs several at once."""
     target: int | None = None
     """The end of the move that is under way, where it is known."""
     limits: tuple[int, int] | None = None
@@ -441,6 +455,11 @@ class Values(OfDrive):
     def actions(self) -> Actions:
         """What a program asks of it."""
         return Actions(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        """What a person edits and switches of it besides its settings."""
+        return ByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         """Read everything of a drive that a cell file needs. Raises Refused, NoAnswer or Inexpressible."""

@@ -11,6 +11,7 @@ from math import ceil
 from typing import NamedTuple
 
 from multidrop.base.errors import Diagnostic, DriveError, TransportLost
+from multidrop.dialects.by_hand import Variable
 from multidrop.dialects.values import Readings
 from multidrop.drives.events import BusEvent, Rested
 
@@ -220,6 +221,15 @@ class SettingsRead(NamedTuple):
     """False: the drive was restarted, or may have been, and what was read before is not how it is set."""
 
 
+class VariablesRead(NamedTuple):
+    """The variables of the programs in a drive were read."""
+
+    at: float
+    bus: str
+    address: str
+    variables: tuple[Variable, ...]
+
+
 class Phase(Enum):
     """The action of an observed program on a line."""
 
@@ -259,6 +269,7 @@ SessionEvent = (
     | ProgramRead
     | ProgramSeen
     | SettingsRead
+    | VariablesRead
     | StateChanged
 )
 

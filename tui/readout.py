@@ -10,9 +10,10 @@ from enum import Enum
 from itertools import takewhile
 from typing import NamedTuple
 
+from multidrop.dialects.by_hand import Variable
 from multidrop.dialects.values import Conditions, Pace, Readings
 from multidrop.drives.events import Conditioned, Sample, Silent
-from multidrop.shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
+from multidrop.shell.events import Agreed, Diverged, Phase, Predicted, SettingsRead, TwinEnded, TwinEvent, VariablesRead
 from multidrop.tui.figures import NATIVE, Figures
 from multidrop.tui.text import age
 
@@ -177,6 +178,9 @@ class Readout:
     settings: Readings | None = None
     """Every setting, as last read in this session."""
     settings_at: float = -math.inf
+    variables: tuple[Variable, ...] | None = None
+    """The variables of its programs, as last read in this session."""
+    variables_at: float = -math.inf
     twin: TwinReadout | None = None
     """The twin of this axis; None: none runs."""
     figures: Figures = NATIVE
@@ -267,6 +271,14 @@ class Readout:
         if known is None or known.twin is None or (before := known.twin.predicted) is None:
             return False
         return event.velocity == 0 and before._replace(at=event.at) == event
+
+    def take_read(self, event: SettingsRead | VariablesRead) -> None:
+        """Take settings or variables that were read; after a restart both are unknown again."""
+        if isinstance(event, VariablesRead):
+            self.variables, self.variables_at = event.variables, event.at
+            return
+        self.settings, self.settings_at = event.readings if event.known else None, event.at
+        self.variables = self.variables if event.known else None
 
     def no_answer(self, at: float) -> None:
         """Note that the drive did not reply to a poll."""

@@ -348,9 +348,8 @@ class ScreenModel:
                 program = self.bus(event.bus).readout(event.address).program
                 program.line, program.phase, program.seen_at = event.line, event.phase, event.at
                 program.break_point = event.break_point
-            case events.SettingsRead():
-                readout = self.bus(event.bus).readout(event.address)
-                readout.settings, readout.settings_at = event.readings if event.known else None, event.at
+            case events.SettingsRead() | events.VariablesRead():
+                self.bus(event.bus).readout(event.address).take_read(event)
 
     def quiet(self, event: events.SessionEvent) -> bool:
         """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from multidrop.base.feature import Feature
+from multidrop.dialects.checksums import LineChecksum
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
 from multidrop.families.lexium.scheme import ModbusScheme
@@ -37,6 +38,9 @@ FAMILY = Feature(
         ),
         Demo(f"{HERE}.simulator"),
         ModbusScheme(),
+        LineChecksum("mcode", "MCode with CK=1 or CK=2", f"{HERE}.host.checksums:mcode"),
+        LineChecksum("modbus-rtu", "Modbus RTU", f"{HERE}.host.checksums:rtu"),
+        LineChecksum("modbus-ascii", "Modbus ASCII", f"{HERE}.host.checksums:ascii_frame"),
         Examples("program convert", ("program convert shuttle.mxt --to lexium -o shuttle-lmd.mxt",)),
         Examples("rescue", ("rescue COM3 --baud 9600 --dialect mcode",)),
     ),

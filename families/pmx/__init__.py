@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from multidrop.base.feature import Feature
+from multidrop.dialects.checksums import LineChecksum
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
 from multidrop.dialects.usb import UsbModule
@@ -28,6 +29,7 @@ FAMILY = Feature(
         Simulated("pmx", f"{HERE}.simulator.family:SimulatedPmx", ("PMX",), f"{HERE}.simulator.program_run:AScriptRun"),
         UsbModule("pmx", "a PMX controller", "Performax controller", 0x1589, 0xA101, ("Arcus", "Performax USB")),
         Demo(f"{HERE}.simulator"),
+        LineChecksum("pmx", "PMX", f"{HERE}.host.checksums:pmx"),
         Examples("program list", ("program list 'sim:#pmx'",)),
         Examples("poll", ("poll 'sim:#pmx' PX --every 0.5 --rows 10",)),
         Examples("help", ("help EX --dialect pmx",)),

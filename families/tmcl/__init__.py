@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from multidrop.base.feature import Feature
+from multidrop.dialects.checksums import LineChecksum
 from multidrop.dialects.families import Dialect
 from multidrop.dialects.program_files import ProgramFiles
 from multidrop.shell.operations.operation import Examples
@@ -42,6 +43,7 @@ FAMILY = Feature(
             ),
             f"{HERE}.simulator.program_run:TmclRun",
         ),
+        LineChecksum("tmcl", "TMCL", f"{HERE}.host.checksums:tmcl"),
         Examples("scan", ("scan /dev/ttyUSB0 --dialect tmcl --all",)),
     ),
 )

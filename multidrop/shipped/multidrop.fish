@@ -106,8 +106,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share snapshot twin 'twin fit' certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' features help lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --from --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish plant share checksum snapshot twin 'twin fit' certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log at' 'log bisect' 'log judge' 'log replay' config 'config path' 'config show' 'config check' features help lsp report completion
+set -g _shtab_multidrop_opts_with_value --address --against --allow --baud --break --cell --cluster --compare --csv --dialect --drive --every --expect --from --jobs --join --junit --language --on --other --output --page --parquet --personality --random --rate --resume --rfc2217 --role --rows --run --save --search --seed --serve --set --speed --svg --tcp --times --to --until --vary --watch --with -d -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -372,6 +372,11 @@ complete -c multidrop -n '_shtab_multidrop_using share' -l rfc2217 -x -d 'serve 
 complete -c multidrop -n '_shtab_multidrop_using share' -l json -d 'print the endpoint and the events as JSON objects, a line each'
 complete -c multidrop -n '_shtab_multidrop_using share' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using share; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'the port to lend'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a checksum -d 'Show the bytes of a line with its checksum, and how that is formed; sends nothing.'
+complete -c multidrop -n '_shtab_multidrop_using checksum' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using checksum' -s d -l address -x -d 'the drive'"'"'s name, number or unit'
+complete -c multidrop -n '_shtab_multidrop_using checksum' -l no-config -d 'read no configuration file'
+complete -c multidrop -n '_shtab_multidrop_using checksum; and test $_shtab_multidrop_npos -eq 0' -ka "mcode modbus-rtu modbus-ascii pmx tmcl" -d 'how frames are sealed: mcode, modbus-rtu, modbus-ascii, pmx, tmcl'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a snapshot -d 'Read every drive into a new cell file, which the simulator opens as the same machine.'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'

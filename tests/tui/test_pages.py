@@ -111,7 +111,22 @@ async def test_a_drive_with_an_error_is_counted_as_that() -> None:
         assert "2 error · 1 moving · 1 at rest" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
 
 
-PAGES = ["", "plot", "drives", "controls", "program", "parameters", "why", "traffic", "macros"]
+PAGES = [
+    "",
+    "plot",
+    "drives",
+    "controls",
+    "program",
+    "parameters",
+    "why",
+    "traffic",
+    "macros",
+    "setup",
+    "variables",
+    "outputs",
+    "programs",
+    "io",
+]
 
 
 @pytest.mark.parametrize("page", PAGES)

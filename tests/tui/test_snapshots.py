@@ -14,11 +14,12 @@ import pytest
 from textual.pilot import Pilot
 
 from multidrop.base.errors import TransportLost
+from multidrop.dialects.by_hand import Variable
 from multidrop.dialects.values import IO, VARIABLES, Conditions, Reading, Readings
 from multidrop.drives.events import Conditioned, Sample, Traffic, Valued
 from multidrop.drives.stopping import Fate
 from multidrop.shell.batch.virtual_loop import VirtualLoop
-from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, ProgramSeen, SettingsRead
+from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, ProgramSeen, SettingsRead, VariablesRead
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import Filter, Series
 from multidrop.tui.app import MultidropApp
@@ -367,7 +368,13 @@ def test_page(snap_compare: Compare, name: str, size: str) -> None:
 
 # Forms
 
-FORMS = {"setup": ("down", "enter", *"5 mm", "enter", "down", "enter", *"0 to 300", "enter", "ctrl+s")}
+FORMS = {
+    "outputs": ("2",),
+    "programs": ("down", "enter"),
+    "setup": ("down", "enter", *"5 mm", "enter", "down", "enter", *"0 to 300", "enter", "ctrl+s"),
+    "variables": ("r", "down", "enter", *"77", "enter"),
+}
+VARIABLES_OF_A = (*(Variable(f"R{n}", n * 100, "kept by S") for n in (1, 2, 3, 4)), Variable("Q1", 3, "kept by S"))
 
 
 @pytest.mark.parametrize("size", BOTH)
@@ -375,6 +382,7 @@ FORMS = {"setup": ("down", "enter", *"5 mm", "enter", "down", "enter", *"0 to 30
 def test_form(snap_compare: Compare, name: str, size: str) -> None:
     async def act(pilot: Pilot[int], session: FakeSession) -> None:
         await emit(pilot, *a_talk(session), *a_move(session))
+        session.emit(VariablesRead(session.time, "press", "a", VARIABLES_OF_A))
         await pilot.app.run_action(f"act.page('{name}')")
         await settle(pilot)
         if name == "setup":

@@ -69,6 +69,10 @@ class Form(ABC):
         """Forget what belongs to the drive that was selected before."""
         self.edits = {}
 
+    def sent(self) -> None:
+        """Do what follows the lines that were sent."""
+        return
+
     def heading(self) -> str:
         """Return what is at the right of the heading."""
         return ""
@@ -193,6 +197,7 @@ class FormPage(SendingPage):
         if self.begun is not None:
             if (begun := self.accepted()) is not None:
                 self.send(begun.lines)
+                self.form.sent()
             return
         if self.form.nothing():
             self.say(self.form.nothing())

@@ -18,6 +18,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.controls import Controls, Homing, by_mode, controls_of, homings_of
 from multidrop.dialects.listed_settings import ListedParameters
@@ -35,6 +36,7 @@ from multidrop.dialects.values import (
     Plan,
     Progress,
     Reading,
+    SlotState,
     Snapshot,
     Value,
     Values,
@@ -250,6 +252,12 @@ def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
     )
 
 
+def _slot(n: int, state: int | None, facts: Facts) -> SlotState:
+    place = str(facts.get(f"SPC{n}", "")) if state in (RUNNING, PAUSED) else ""
+    words = "not read yet" if state is None else table.program_words(state)
+    return SlotState(f"program {n}", words, place, state == RUNNING)
+
+
 def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
     """The ramps of a move: an axis's own values count unless they are 0. Times are in ms."""
     low, high, up, down = (facts.get(name + axis) or facts.get(name, 0) for name in SPEEDS)
@@ -295,6 +303,12 @@ class PmxValues(Values):
     @property
     def parameters(self) -> Parameters:
         return PmxParameters(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        from multidrop.families.pmx.host.by_hand import PmxByHand
+
+        return PmxByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         readings = yield from PmxParameters(self.state).read(progress)
@@ -368,6 +382,7 @@ class PmxValues(Values):
             lamps=tuple(lamps),
             program=", ".join(f"{n} {table.program_words(states[n] or 0)}" for n in active),
             runs=None if None in states else RUNNING in states,  # a paused one moves nothing
+            slots=tuple(_slot(n, states[n], facts) for n in PROGRAMS),
             line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
             more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
         )

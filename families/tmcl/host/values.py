@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Refused
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.controls import BY, Controls, Homing, by_mode, controls_of, homings_of
 from multidrop.dialects.listed_settings import ListedParameters
@@ -275,6 +276,12 @@ class TmclValues(Values):
     @property
     def parameters(self) -> Parameters:
         return TmclParameters(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        from multidrop.families.tmcl.host.by_hand import TmclByHand
+
+        return TmclByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         readings = yield from TmclParameters(self.state).read(progress)

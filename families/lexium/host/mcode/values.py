@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, NoAnswer, Refused
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import End, Priority, Procedure
 from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.state import who
@@ -76,6 +77,12 @@ class MCodeValues(LexiumValues):
     @property
     def parameters(self) -> Parameters:
         return MCodeParameters(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        from multidrop.families.lexium.host.mcode.by_hand import MCodeByHand
+
+        return MCodeByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""

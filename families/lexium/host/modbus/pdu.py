@@ -13,7 +13,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 
-from pymodbus.framer import FramerSocket
+from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest, WriteSingleCoilRequest
 from pymodbus.pdu.mei_message import ReadDeviceInformationRequest, ReadDeviceInformationResponse
@@ -153,3 +153,8 @@ class PduCodec:
 
 def _bytes(pdu: ModbusPDU) -> bytes:
     return bytes((pdu.function_code,)) + pdu.encode()
+
+
+def crc(frame: bytes) -> bytes:
+    """Return the CRC-16 of an RTU frame, as it is sent: low byte first."""
+    return FramerRTU.compute_CRC(frame).to_bytes(2)

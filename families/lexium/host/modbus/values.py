@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.base.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
@@ -150,6 +151,12 @@ class ModbusValues(LexiumValues):
     @property
     def parameters(self) -> Parameters:
         return ModbusParameters(self.state)
+
+    @property
+    def by_hand(self) -> ByHand:
+        from multidrop.families.lexium.host.modbus.by_hand import ModbusByHand
+
+        return ModbusByHand(self.state)
 
     def snapshot(self, progress: Progress) -> Procedure[Snapshot]:
         state = self.state
