@@ -85,3 +85,8 @@ def by_mode(homings: Sequence[Homing]) -> dict[str, dict[str, str]]:
         if len(homing.lines) == 1:
             modes.setdefault(homing.mode, {})[homing.sign] = homing.lines[0]
     return modes
+
+
+def homings_by_mode(modes: Mapping[str, Mapping[str, str]]) -> list[Homing]:
+    """The homings of a family without such a table, from the lines by mode and direction."""
+    return [Homing(mode, sign, (line,)) for mode, lines in modes.items() for sign, line in lines.items()]

@@ -18,7 +18,7 @@ from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.text import real
 from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.controls import NAMES, UNKNOWN, Control, Controls, Homing
+from multidrop.dialects.controls import NAMES, UNKNOWN, Control, Controls, Homing, homings_by_mode
 from multidrop.dialects.state import OfDrive, who
 
 # Settings, and the steps that change them
@@ -493,8 +493,7 @@ class Values(OfDrive):
 
     def homings(self, axis: str) -> Sequence[Homing]:
         """Every way to home an axis, the usual one first."""
-        modes = self.actions.homings(axis).items()
-        return [Homing(mode, sign, (line,)) for mode, lines in modes for sign, line in lines.items()]
+        return homings_by_mode(self.actions.homings(axis))
 
     def own(self, word: str) -> bool:
         """Whether a checked word belongs to the language; any other would be a name that a person gave."""
