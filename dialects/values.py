@@ -18,7 +18,7 @@ from multidrop.base.errors import Diagnostic, Inexpressible, Refused
 from multidrop.base.text import real
 from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.controls import NAMES, Control, Controls
+from multidrop.dialects.controls import NAMES, UNKNOWN, Control, Controls, Homing, homings_by_mode
 from multidrop.dialects.state import OfDrive, who
 
 # Settings, and the steps that change them
@@ -489,7 +489,11 @@ class Values(OfDrive):
 
     def controls(self, axis: str) -> Controls:
         """The controls of an axis."""
-        return {name: Control(absent="such drives have no line for it, as far as is known") for name in NAMES}
+        return {name: Control(absent=UNKNOWN) for name in NAMES}
+
+    def homings(self, axis: str) -> Sequence[Homing]:
+        """Every way to home an axis, the usual one first."""
+        return homings_by_mode(self.actions.homings(axis))
 
     def own(self, word: str) -> bool:
         """Whether a checked word belongs to the language; any other would be a name that a person gave."""

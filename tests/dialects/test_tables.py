@@ -17,6 +17,7 @@ PAIRS = (
     ["topic", "text"],
     ["of", "value"],
     ["group", "point"],
+    ["mode", "sign"],
 )
 """The heads of the two cells that are the key of a row together."""
 

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from textual import events
 from textual.pilot import Pilot
 
-from multidrop.dialects.controls import BY, NAMES, TO
+from multidrop.dialects.controls import BY, NAMES, SET, SPEED, TARGET, TO
 from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.family import Family
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
@@ -461,7 +462,7 @@ async def test_a_key_that_does_nothing_names_the_keys_that_work() -> None:
             said = " ".join(page.lines("said").plain.split())
             assert "does nothing here; " in said and "Space stop" in said, key
         await press(pilot, "plus")
-        assert "h begins a homing" in page.lines("said").plain
+        assert "h lists the homings" in page.lines("said").plain
         await press(pilot, "enter")
         assert "Enter sends a line that is shown" in page.lines("said").plain
         await press(pilot, "tab")
@@ -491,3 +492,113 @@ def test_a_quantity_stands_where_every_family_takes_one() -> None:
         distance = made.values.controls(axis)[BY].filled(by="{1 mm}", to=90)[-1]
         found = [distance[field.start : field.stop] for field in made.units.fields(distance)]
         assert found == (["90"] if family == "pmx" else ["{1 mm}"]), family
+
+
+# Homings, errors, positions, changes on the fly
+
+
+def made_of(family: str, product: str = "") -> Family:
+    kind = FAMILIES[family]
+    state = kind.new_state(kind.codec, "a")
+    state.product = product or state.product
+    return kind(state)
+
+
+HOMINGS = {
+    ("mcode", "", ""): [*(f"HM {n}" for n in (1, 3, 2, 4)), *(f"HI {n}" for n in (1, 3, 2, 4))],
+    ("modbus", "", ""): [*(f"HM {n}" for n in (1, 3, 2, 4)), *(f"HI {n}" for n in (1, 3, 2, 4))],
+    ("pmx", "x", ""): ["HX-", "HX+", "HLX-", "HLX+", "LX-", "LX+", "ZX-", "ZX+", "ZHX-", "ZHX+"],
+    ("pmx", "y", ""): ["HY-", "HY+", "HLY-", "HLY+", "LY-", "LY+", "ZY-", "ZY+", "ZHY-", "ZHY+"],
+    ("tmcl", "", ""): ["RFS START, 0"],
+    ("tmcl", "2", "TMCM-3110"): [
+        "RFS START, 2",
+        *(f"SAP 193, 2, {mode}; RFS START, 2" for mode in (1, 65, 2, 66, 3, 4, 5, 6, 8, 7)),
+    ],
+}
+
+
+@pytest.mark.parametrize(("family", "axis", "product"), HOMINGS)
+def test_every_homing_of_a_family_is_listed(family: str, axis: str, product: str) -> None:
+    found = made_of(family, product).values.homings(axis)
+    assert ["; ".join(homing.lines) for homing in found] == HOMINGS[family, axis, product]
+    assert all(homing.about for homing in found)
+
+
+LINES = {
+    ("mcode", ""): {SET: "P=7", SPEED: "", TARGET: ""},
+    ("modbus", ""): {SET: "P=7", SPEED: "", TARGET: ""},
+    ("pmx", "y"): {SET: "PY=7", SPEED: "SSPDY=7", TARGET: "TY7"},
+    ("tmcl", "1"): {SET: "MST 1; SAP 1, 1, 7; SAP 0, 1, 7", SPEED: "SAP 4, 1, 7", TARGET: "MVP ABS, 1, 7"},
+}
+
+
+@pytest.mark.parametrize(("family", "axis"), LINES)
+def test_what_changes_a_move_or_the_position_is_a_line_of_the_family_or_a_reason(family: str, axis: str) -> None:
+    controls = made_of(family).values.controls(axis)
+    for name, line in LINES[family, axis].items():
+        assert "; ".join(controls[name].filled(to=7)) == line
+        assert bool(line) != bool(controls[name].absent)
+
+
+@pytest.mark.parametrize(
+    ("keys", "sent"),
+    [
+        (("h", "down", "enter"), ["press:a HM 1"]),
+        (("h", "down", "down", "down", "enter"), ["press:a HM 2"]),
+        (("h", "up", "enter"), ["press:a HI 4"]),
+        (("h", "+", "+", "enter"), ["press:a HM 4"]),
+        (("h", "h", "enter"), ["press:a HM 1"]),
+        (("h", "enter"), []),
+        (("h", "down", "escape", "enter"), []),
+        (("h", "down", "right", "enter"), []),
+        (("h", "down", "x", "enter"), []),
+        (("h", "down", "tab", "enter"), []),
+        (("h", "down", "ctrl+x", "enter"), []),
+        (("h", "down", "space", "enter"), ["press:a SL 0"]),
+        (("r", "enter"), ["press:a PR ER"]),
+        (("r", "escape", "enter"), []),
+        (("p", *"0", "enter"), ["press:a P=0"]),
+        (("p", "enter"), []),
+        (("v",), []),
+    ],
+)
+@at_screen
+async def test_choosing_shows_the_line_and_enter_sends_it(keys: tuple[str, ...], sent: list[str]) -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        for key in keys:
+            await press(pilot, key)
+        assert session.sent == sent, page.said
+        assert page.said[0] or keys[-1] == "escape"
+
+
+@at_screen
+async def test_the_list_of_homings_shows_every_line_and_the_one_that_enter_sends() -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        await press(pilot, "h")
+        shown = page.lines("controls").plain
+        assert all(f"{word} {n}" in shown for word in ("HM", "HI") for n in (1, 2, 3, 4))
+        await press(pilot, "down", "down")
+        assert "▌ home +" in page.lines("controls").plain
+        assert "Enter sends HM 3 - seeks the home switch in plus" in page.lines("said").plain
+        for key in ("h", "down", "enter"):  # in one read
+            pilot.app.post_message(events.Key(key, key if len(key) == 1 else None))
+        await settle(pilot)
+        assert session.sent == []
+        assert "not sent: " in page.lines("said").plain
+
+
+@at_screen
+async def test_a_position_is_not_set_while_the_axis_moves_and_no_target_is_changed_where_it_cannot() -> None:
+    async with on_screen() as (pilot, _, session):
+        page = await opened(pilot, session)
+        await press(pilot, "p", *"7")
+        await emit(pilot, OnBus("press", Sample(session.time, "a", 1500, 400)))
+        await press(pilot, "enter")
+        assert "not sent: whether the axis rests is unknown" in page.lines("said").plain
+        await press(pilot, "m")
+        assert "it moves, and no target here: the manual describes no change" in page.lines("said").plain
+        await press(pilot, "v")
+        assert "no speed here: a change of VM has no effect before the" in page.lines("said").plain
+        assert (session.sent, page.asked) == ([], None)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from multidrop.dialects.controls import Controls
+from collections.abc import Sequence
+
+from multidrop.dialects.controls import Control, Controls, Homing
 from multidrop.shell.amounts import AmountReader
 from multidrop.tui.panels.drive import unit_of
 from multidrop.tui.panels.view import Glance, View
-from multidrop.tui.readout import Readout
+from multidrop.tui.readout import Readout, ReadoutState
+from multidrop.tui.screens.jogging import Jog
 from multidrop.tui.screens.page import PageHost
+
+CLEAR = "clear"
+"""The control that clears the error of an axis."""
 
 
 class ChosenAxis:
@@ -50,10 +56,38 @@ class ChosenAxis:
             return chosen[1].axis if chosen is not None else ""
         return self._host.model.bus(session.selected_bus).readout(session.selected.address).axes[0].axis
 
+    @property
+    def moves(self) -> bool:
+        """Whether it was read in motion."""
+        chosen = self.now()
+        return chosen is not None and chosen[1].last is not None and chosen[1].own_state is ReadoutState.MOVING
+
+    def rests(self, jog: Jog) -> bool:
+        """Whether it is known to rest: it was read so since the last line."""
+        chosen = self.now()
+        if chosen is None:
+            return False
+        glance, axis = chosen
+        now = self._host.session.now()
+        jog.look(now, idle=self._host.outbox.idle)
+        return not jog.restless(glance.readout, axis, glance.state(), now)
+
     def controls(self) -> Controls:
         """Its controls; none without a drive."""
+        drive, axis = self._host.session.selected, self.axis
+        if drive is None:
+            return {}
+        actions = drive.family.values.actions
+        # The word that reads the error clears it, or another line does.
+        line = drive.family.question(actions.error) if actions.error else actions.clear(axis)
+        about = "reads the error, which clears it" if actions.error else "clears the error"
+        clear = Control((line,), about) if line else Control(absent=actions.no_error or "no line clears it")
+        return {**drive.family.values.controls(axis), CLEAR: clear}
+
+    def homings(self) -> Sequence[Homing]:
+        """Every way to home it."""
         drive = self._host.session.selected
-        return drive.family.values.controls(self.axis) if drive is not None else {}
+        return drive.family.values.homings(self.axis) if drive is not None else ()
 
     def nothing(self) -> str:
         """Why a key other than the stop does nothing: there is no drive, or the person has not seen it yet."""

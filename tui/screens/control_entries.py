@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.controls import BY, TO, Control
+from multidrop.dialects.controls import BY, SET, SPEED, TARGET, TO, Control
 from multidrop.dialects.units import Takes
 from multidrop.shell.amounts import Amount, AmountReader
 from multidrop.tui.readout import Readout
@@ -21,9 +21,14 @@ class Entry:
     takes: Takes
 
 
+ON_THE_FLY = "target"
+"""The entry that `m` opens while the axis moves."""
 ENTRIES = {
     "m": Entry(TO, "move to a position", Takes.PLACE),
     "b": Entry(BY, "move by a distance", Takes.DISTANCE),
+    "p": Entry(SET, "the position here is", Takes.PLACE),
+    "v": Entry(SPEED, "speed of the move, without sign", Takes.SPEED),
+    ON_THE_FLY: Entry(TARGET, "new target of the move", Takes.PLACE),
     "l": Entry("", "length of a step", Takes.DISTANCE),
 }
 
@@ -35,8 +40,11 @@ def filled(control: Control, axis: Readout, amount: Amount) -> tuple[str, ...]:
 
 
 def moving_lines(entry: Entry, control: Control, axis: Readout, amount: Amount) -> tuple[str, ...]:
-    """The lines of the move of an entry."""
-    return filled(control, axis, amount) if entry.control == BY else control.filled(to=amount.text)
+    """The lines that an entry sends."""
+    if entry.control == BY:
+        return filled(control, axis, amount)
+    # A quantity is a place before the position is set, and another one after it.
+    return control.filled(to=amount.number if entry.control == SET else amount.text)
 
 
 def read(entry: Entry, text: str, reader: AmountReader) -> Amount:
@@ -47,19 +55,19 @@ def read(entry: Entry, text: str, reader: AmountReader) -> Amount:
     return amount
 
 
-def asked_row(entry: Entry, text: str, reader: AmountReader, control: Control | None, axis: Readout, width: int) -> Row:
-    """What is asked for, with what the entry would send, or why it would not."""
+def asked_rows(
+    entry: Entry, text: str, reader: AmountReader, control: Control | None, axis: Readout, width: int
+) -> list[Row]:
+    """What is asked for, with what the entry would send, or why it would not; below each other where it is narrow."""
     label: list[Span] = [(f" {entry.what}: ", "strong"), (reader.asks(entry.takes), "dim")]
-    if text.strip():
-        try:
-            amount = read(entry, text, reader)
-        except Diagnostic as problem:
-            label.append((f"   {problem.message}", "motion"))
-        else:
-            lines = (
-                moving_lines(entry, control, axis, amount) if control is not None else (f"a step of {amount.typed}",)
-            )
-            other = reader.other(amount, entry.takes)
-            label.append((f"   → {', '.join(lines)}{f'  = {other}' if other else ''}", "strong"))
-    label.append(("   Enter; Esc ↑↓ Tab leave" if width_of(label) < width - 26 else "", "dim"))
-    return tuple(label)
+    if not text.strip():
+        return [(*label, ("   Enter; Esc ↑↓ Tab leave", "dim"))]
+    try:
+        amount = read(entry, text, reader)
+    except Diagnostic as problem:
+        outcome: Span = (f"   {problem.message}", "motion")
+    else:
+        lines = moving_lines(entry, control, axis, amount) if control is not None else (f"a step of {amount.typed}",)
+        other = reader.other(amount, entry.takes)
+        outcome = (f"   → {', '.join(lines)}{f'  = {other}' if other else ''}", "strong")
+    return [(*label, outcome)] if width_of([*label, outcome]) <= width else [tuple(label), (outcome,)]

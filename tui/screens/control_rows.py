@@ -2,35 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from multidrop.base.text import counted
 from multidrop.dialects.controls import (
     BY,
     DISABLE,
     ENABLE,
-    HOME_MINUS,
-    HOME_PLUS,
+    SET,
+    SPEED,
     STOP,
+    TARGET,
     TO,
     Control,
     Controls,
+    Homing,
 )
 from multidrop.dialects.units import Takes
 from multidrop.shell.amounts import Amount, AmountReader
 from multidrop.tui.readout import Readout
-from multidrop.tui.screens.control_entries import ENTRIES, filled
+from multidrop.tui.screens.chosen_axis import CLEAR
+from multidrop.tui.screens.control_entries import ENTRIES, ON_THE_FLY, filled
 from multidrop.tui.screens.jogging import Jog
 from multidrop.tui.text import fit
-from multidrop.tui.widgets.lines import Row, Span, width_of
+from multidrop.tui.widgets.lines import Row, Span, in_view, width_of
 
 SPACE = "space"
-KEYED = {"-": HOME_MINUS, "+": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
-"""Keys of controls. Enter sends them, apart from the stop; a direction counts after `h`."""
+KEYED = {SPACE: STOP, "r": CLEAR, "e": ENABLE, "d": DISABLE}
+"""Keys of controls. Enter sends them, apart from the stop."""
 WORDS = {
     TO: "move to",
     BY: "move by",
-    HOME_MINUS: "home −",
-    HOME_PLUS: "home +",
+    SET: "position",
+    SPEED: "speed",
+    TARGET: "target",
     STOP: "stop",
+    CLEAR: "error",
     ENABLE: "enable",
     DISABLE: "disable",
 }
@@ -38,6 +45,7 @@ NO_CONTROLS = "this family has no controls"
 KEY = 9
 WORD = 10
 LINE = 22
+MODE = 16
 
 
 def jog_rows(
@@ -76,20 +84,37 @@ def rule(words: str, width: int) -> Row:
     return ("─ ", "rule"), (f"{words} ", "dim"), ("─" * max(0, width - len(words) - 3), "rule")
 
 
-def control_rows(controls: Controls, width: int) -> list[Row]:
+def control_rows(controls: Controls, homings: Sequence[Homing], width: int) -> list[Row]:
     """The controls that have a key each."""
     rows: list[Row] = [rule("move", width)]
     for key, entry in ENTRIES.items():
-        if entry.control:
+        if entry.control and key != ON_THE_FLY:
             rows.append(control_row(key, entry.control, controls[entry.control], "…", width))
+    home = ", ".join(homings[0].lines) if homings else "not here: such drives have no line for it"
+    more = f"and {len(homings) - 1} more: h lists them" if len(homings) > 1 else ""
+    rows.append(
+        ((f" {fit('h', KEY)}", "key"), (f"{fit('home', WORD)} ", "text"), (fit(home, LINE), "strong"), (more, "dim"))
+    )
     for key, name in KEYED.items():
         rows.append(control_row(key, name, controls[name], "", width))
     return rows
 
 
+def homing_rows(homings: Sequence[Homing], at: int, width: int, height: int) -> list[Row]:
+    """The homings of the axis around the one that is chosen; below 0: none is."""
+    rows: list[Row] = [rule("home: ↑↓ or - + choose, Enter sends the line that is shown, Esc: nothing", width)]
+    for number, homing in in_view(homings, max(at, 0), height - 1):
+        role = "focus" if number == at else "text"
+        sign = {"-": "−"}.get(homing.sign, homing.sign)
+        mode = fit(f"{homing.mode} {sign}", MODE)
+        line = fit(", ".join(homing.lines), LINE + 8)
+        rows.append(((" ▌ " if number == at else "   ", "focus"), (f"{mode} {line}", role), (homing.about, "dim")))
+    return rows
+
+
 def control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:
     """Key, word, lines and meaning of a control; an absent one has its reason."""
-    shown = "Space" if key == SPACE else key if number else f"{'h' if key in '+-' else ''}{key} Enter"
+    shown = "Space" if key == SPACE else key if number else f"{key} Enter"
     if control.absent:
         text = fit(f"not here: {control.absent}", max(0, width - KEY - WORD - 3))
         return ((f" {fit('', KEY)}", "dim"), (f"{fit(WORDS[name], WORD)} ", "dim"), (text, "dim"))

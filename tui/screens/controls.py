@@ -16,7 +16,7 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.controls import BY, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO
+from multidrop.dialects.controls import BY, HIGH, LOW, SET, STOP, TARGET, TO
 from multidrop.dialects.units import Takes
 from multidrop.shell.amounts import Amount, AmountReader
 from multidrop.tui.key_table import SHEETS, shown_key
@@ -24,13 +24,14 @@ from multidrop.tui.panels.drive import drive_rows
 from multidrop.tui.panels.view import View, name_of
 from multidrop.tui.readout import READ
 from multidrop.tui.screens.chosen_axis import ChosenAxis
-from multidrop.tui.screens.control_entries import ENTRIES, asked_row, moving_lines, read
+from multidrop.tui.screens.control_entries import ENTRIES, ON_THE_FLY, asked_rows, moving_lines, read
 from multidrop.tui.screens.control_rows import (
     KEYED,
     NO_CONTROLS,
     SPACE,
     WORDS,
     control_rows,
+    homing_rows,
     jog_rows,
     readiness,
 )
@@ -43,6 +44,8 @@ FIRST_STEP = "100"
 """The length of a step until a person chooses one, in the drive's own counts."""
 
 
+HOMING = "homing"
+"""The kind of an offer that is one of the list of homings."""
 LEFT = "nothing was sent: the entry was left without Enter"
 KEYS = "; ".join(
     f"{key.shown} {key.word or key.about.split(':')[0]}" for key in SHEETS["controls"].keys if key.word or key.name
@@ -71,8 +74,8 @@ class ControlsPage(SendingPage):
         self.step = FIRST_STEP
         self._jog = Jog()
         self._axis = ChosenAxis(host)
-        self._homing = False
-        """The next key may be the direction of a homing."""
+        self._homing: int | None = None
+        """The place of the homing that is chosen in the list; -1: none is yet. None: the list is not shown."""
         self._before = ""
         """What the entry held before the last key."""
         self._void = False
@@ -90,13 +93,13 @@ class ControlsPage(SendingPage):
         # Forget what was begun before a stop, or for another drive.
         place = view.session.place
         if self._axis.shown(view):
-            self._jog = Jog()
+            self._jog, self._homing = Jog(), None
         asked = self.asked
         if asked is not None and asked.overtaken(self.host.session):
             self._close("stopped; the entry was not used" if asked.place == place else "another drive is selected")
         begun = self.begun
         if begun is not None and begun.overtaken(self.host.session):
-            self.begun = None
+            self.begun = self._homing = None
             self.say("stopped; nothing was sent" if begun.place == place else "another drive is selected")
         if view.model.trouble:
             self.say(f"✗ {view.model.trouble}")
@@ -125,9 +128,12 @@ class ControlsPage(SendingPage):
         why = readiness(self._jog, self._jog.obstacle(glance.readout, axis, glance.state(), view.now))
         several = len(glance.readout.axes) > 1
         rows = jog_rows(controls[BY], axis, reader, self._step(reader), several, why, width)
-        self.lines("controls").put([*rows, *control_rows(controls, width)])
+        homings, at = self._axis.homings(), self._homing
+        height = self.lines("controls").size.height - len(rows)
+        more = control_rows(controls, homings, width) if at is None else homing_rows(homings, at, width, height)
+        self.lines("controls").put([*rows, *more])
         entry = ENTRIES[asked.kind] if asked is not None else None
-        asks = [asked_row(entry, self.field.value, reader, controls.get(entry.control), axis, width)] if entry else []
+        asks = asked_rows(entry, self.field.value, reader, controls.get(entry.control), axis, width) if entry else []
         show_rows(self.lines("asked"), asks)
 
     def _step(self, reader: AmountReader) -> Amount:
@@ -142,7 +148,7 @@ class ControlsPage(SendingPage):
     # Keys
 
     def action_step(self, by: int) -> None:
-        if self._left():
+        if self._left() or self._choose_homing(-by):
             return
         self.begun, chosen = None, self._axis.now()
         if chosen is None:
@@ -169,6 +175,7 @@ class ControlsPage(SendingPage):
     def action_axis(self) -> None:
         if self._left():
             return
+        self.action_drop()
         self.begun, chosen = None, self._axis.now()
         if chosen is None:
             self.say(self._axis.nothing())
@@ -180,6 +187,9 @@ class ControlsPage(SendingPage):
 
     def action_jog(self, sign: int) -> None:
         """Move by one step, if the drive is known to rest; else drop the press."""
+        if self._homing is not None:
+            self.action_drop()
+            return
         self.begun, chosen = None, self._axis.now()
         if chosen is None:
             self.say(self._axis.nothing())
@@ -190,7 +200,7 @@ class ControlsPage(SendingPage):
         """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
         name = KEYED[key]
         control = self._axis.controls().get(name)
-        self.begun, self._homing = None, False
+        self.begun, self._homing = None, None
         if name == STOP and control is not None and not control.absent:
             self.host.outbox.at_once(control.filled())
             self.say(f"sent: {', '.join(control.filled())}", "dim")
@@ -209,63 +219,81 @@ class ControlsPage(SendingPage):
             self.action_drop()
             self.say(f"nothing was sent: Enter sends a line that is shown; {KEYS}")
         elif (begun := self.accepted()) is not None:
-            name = KEYED[begun.kind]
-            if name in (HOME_MINUS, HOME_PLUS):
-                self._move(name, None)
-            elif (control := self._axis.controls().get(name)) is not None:
-                self.send(control.filled())
+            self._homing = None
+            if begun.kind == HOMING and (why := self._obstacle(0)):
+                self.say(f"not sent: {why}")
+            else:
+                self.send(begun.lines)
 
     def action_home(self) -> None:
-        """Ask for the direction of a homing: one letter begins none."""
+        """List the ways to home: one letter begins none."""
+        if self._homing is not None:
+            self._choose_homing(1)
+            return
         self.action_drop()
-        self._homing = not self._axis.nothing()
-        self.say(self._axis.nothing() or "home: - or + is the direction   Esc: nothing")
+        if nothing := self._axis.nothing():
+            self.say(nothing)
+        elif not self._axis.homings():
+            self.say("no homing: such drives have no line for it")
+        else:
+            self._homing = -1
+            self.say("choose a homing: ↑↓, or - and + for its direction   Esc: nothing")
 
     def action_toward(self, sign: str) -> None:
-        if self._homing:
-            self.action_do(sign)
-        else:
-            self.say("nothing was sent: h begins a homing, and + or - is its direction then")
+        """Choose the next homing in a direction."""
+        if not self._choose_homing(1, sign):
+            self.say("nothing was sent: h lists the homings, and + or - chooses one by its direction then")
+
+    def _choose_homing(self, by: int, sign: str = "") -> bool:
+        """Choose the next homing of the list, of a direction if one is given; return whether the list is shown."""
+        homings, at = self._axis.homings(), self._homing
+        if at is None or self._axis.nothing() or not homings:
+            return False
+        start = at if at >= 0 or by > 0 else 0
+        order = [(start + by * n) % len(homings) for n in range(1, len(homings) + 1)]
+        found = [number for number in order if homings[number].sign in ("", sign) or not sign]
+        self._homing = found[0] if found else at
+        if found:
+            homing = homings[found[0]]
+            self.offer(HOMING, homing.lines)
+            self.say(f"Enter sends {', '.join(homing.lines)} - {homing.about}   Esc: nothing")
+        return True
 
     def action_drop(self) -> None:
         """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
-        if self.begun is not None or self._homing:
-            self.begun, self._homing = None, False
+        if self.begun is not None or self._homing is not None:
+            self.begun, self._homing = None, None
             self.say("nothing was sent")
 
     def action_unknown(self, key: str) -> None:
         """Name the keys that work, and drop what waits for Enter."""
-        self.begun, self._homing = None, False
+        self.begun, self._homing = None, None
         self.say(f"nothing was sent: {shown_key(key)} does nothing here; {KEYS}")
 
     def action_ask(self, key: str) -> None:
-        self.begun, self._homing = None, False
+        self.begun, self._homing = None, None
         if not self._axis.controls() or self._axis.nothing():
             self.say(self._axis.nothing() or NO_CONTROLS)
             return
+        kind = ON_THE_FLY if key == "m" and self._axis.moves else key
+        control = self._axis.controls().get(ENTRIES[kind].control)
+        if control is not None and control.absent:
+            moves = "it moves, and " if kind == ON_THE_FLY else ""
+            self.say(f"nothing was sent: {moves}no {WORDS[ENTRIES[kind].control]} here: {control.absent}")
+            return
         self._before, self._void = "", False
-        self.ask_for(key, "", "")
+        self.ask_for(kind, "", "")
 
     def edited(self, text: str) -> None:
         """Take a blank as the key of the stop, unless it divides a number from its unit while the axis rests."""
         before, self._before = self._before, text
         if len(text) != len(before) + 1 or text.count(" ") <= before.count(" "):
             return  # pasted, or no blank
-        if before.strip()[-1:].isdigit() and " " not in before and self._rests():
+        if before.strip()[-1:].isdigit() and " " not in before and self._axis.rests(self._jog):
             return
         self._before, self._void = before, True
         self.field.value = before
         self.action_do(SPACE)
-
-    def _rests(self) -> bool:
-        """Whether the chosen axis is known to rest."""
-        chosen, host = self._axis.now(), self.host
-        if chosen is None:
-            return False
-        glance, axis = chosen
-        now = host.session.now()
-        self._jog.look(now, idle=host.outbox.idle)
-        return not self._jog.restless(glance.readout, axis, glance.state(), now)
 
     def typed(self, text: str) -> None:
         asked, chosen = self.asked, self._axis.now()
@@ -288,32 +316,47 @@ class ControlsPage(SendingPage):
             self.step = amount.typed
             self.say(f"the step is {amount.typed}", "dim")
 
-    def _move(self, name: str, amount: Amount | None) -> None:
-        """Start a move, if the drive is known to rest; None: it takes no amount."""
+    def _move(self, name: str, amount: Amount) -> None:
+        """Send the lines of an entry, if the axis is in the state for which it was opened."""
         chosen, control = self._axis.now(), self._axis.controls().get(name)
         if chosen is None or control is None:
             self.say(self._axis.nothing() or NO_CONTROLS)
             return
-        glance, axis = chosen
-        host, state = self.host, glance.state()
-        if state in READ and axis.last is not None:
-            state = axis.own_state
-        number = amount.number if amount is not None else 0
-        to = number if name == TO or axis.last is None else axis.last.position + number
-        if not LOW <= to <= HIGH:
-            self.say(f"not sent: the end of the move, {to}, is out of range")
-            return
-        if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
-            self.say(f"not sent: {self._jog.why}")
-        elif amount is None:
-            self.send(control.filled())
+        axis = chosen[1]
+        by = amount.number if name == BY else 0
+        if name == TO and axis.last is not None:
+            by = amount.number - axis.last.position
+        if why := self._obstacle(by) if name in (BY, TO) else self._unfit(name):
+            self.say(f"not sent: {why}")
         else:
             entry = next(each for each in ENTRIES.values() if each.control == name)
             self.send(moving_lines(entry, control, axis, amount))
 
+    def _unfit(self, name: str) -> str:
+        """What keeps an entry that begins no move from being sent; empty: nothing."""
+        if name == SET and not self._axis.rests(self._jog):
+            return "whether the axis rests is unknown"
+        return "it does not move any more; m asks again" if name == TARGET and not self._axis.moves else ""
+
+    def _obstacle(self, by: int) -> str:
+        """Why a move by so much may not start now; empty: it may, and is taken to start."""
+        chosen = self._axis.now()
+        if chosen is None:
+            return self._axis.nothing()
+        (glance, axis), host = chosen, self.host
+        state = glance.state()
+        if state in READ and axis.last is not None:
+            state = axis.own_state
+        to = by + (axis.last.position if axis.last is not None else 0)
+        if not LOW <= to <= HIGH:
+            return f"the end of the move, {to}, is out of range"
+        if self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
+            return ""
+        return self._jog.why
+
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
-        if self.begun is not None or self._homing:
+        if self.begun is not None or self._homing is not None:
             self.action_drop()
         elif self.asked is not None:
             self._close("")

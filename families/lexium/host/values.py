@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from multidrop.dialects.controls import Controls, controls_of
+from multidrop.dialects.controls import Controls, Homing, controls_of
 from multidrop.dialects.values import Actions, Levels, Readings, Snapshot, Value, Values
 from multidrop.families.lexium.manual import points
 from multidrop.families.lexium.manual.mnemonic import EXPANDED
@@ -43,6 +43,9 @@ class LexiumValues(Values):
     def controls(self, axis: str) -> Controls:
         """The one axis has the same over any protocol. (MCode reference 5.1.30, 5.1.54, 5.1.80, 5.1.84, 5.1.117.)"""
         return controls_of(points.__file__)
+
+    def homings(self, axis: str) -> Sequence[Homing]:
+        return points.homings(axis)
 
     def snapshot_of(self, readings: Readings, now: Mapping[str, int]) -> Snapshot:
         """Make the record of a drive from its settings and its state of the moment, by word."""

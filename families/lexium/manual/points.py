@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from multidrop.dialects.controls import Controls, controls_of
+from multidrop.dialects.controls import Controls, Homing, by_mode, controls_of, homings_of
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import UNREAD, Actions, Conditions, Facts, Lamp, Pace, number
 from multidrop.families.lexium.manual.mnemonic import EXPANDED
@@ -156,9 +156,9 @@ def controls(state: DriveState, axis: str) -> Controls:
     return controls_of(__file__)
 
 
-def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
-    """Each creeps off against the direction of the search. (MCode reference 5.1.53, 5.1.54.)"""
-    return {mode: {"-": f"{word} 1", "+": f"{word} 3"} for mode, word in (("home", "HM"), ("index", "HI"))}
+def homings(axis: str) -> Sequence[Homing]:
+    """All types of HM and HI. (MCode reference 5.1.53, 5.1.54.)"""
+    return homings_of(__file__)
 
 
 class LexiumActions(Actions):
@@ -168,7 +168,7 @@ class LexiumActions(Actions):
     no_error = ""
 
     def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
-        return homings(axis)
+        return by_mode(homings(axis))
 
     def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
         return (f"SL {velocity}",)

@@ -20,7 +20,7 @@ from functools import partial
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.controls import Controls, controls_of
+from multidrop.dialects.controls import Controls, Homing, by_mode, controls_of, homings_of
 from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.state import who
 from multidrop.dialects.values import (
@@ -267,10 +267,6 @@ def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
     return Pace(low, high, (high - low) / up * 1000, (high - low) / down * 1000)
 
 
-SEARCHES: Mapping[str, str] = {"home": "H", "home slow": "HL", "limit": "L", "index": "Z", "home index": "ZH"}
-"""The commands of homing by what they use. (7.10.)"""
-
-
 class PmxActions(Actions):
     """What a program asks of a PMX."""
 
@@ -279,7 +275,7 @@ class PmxActions(Actions):
     no_error = ""
 
     def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
-        return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
+        return by_mode(homings_of(__file__, axis.upper()))
 
     def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
         """Set the axis's high speed, and jog; a velocity of 0 stops it."""
@@ -408,6 +404,10 @@ class PmxValues(Values):
 
     def controls(self, axis: str) -> Controls:
         return controls_of(__file__, axis.upper(), table.AXES.index(axis.upper()) + 1)
+
+    def homings(self, axis: str) -> Sequence[Homing]:
+        """The five ways, each in both directions. (7.10.)"""
+        return homings_of(__file__, axis.upper())
 
     @property
     def actions(self) -> Actions:

@@ -13,7 +13,7 @@ from functools import partial
 from multidrop.base.errors import Diagnostic, Refused
 from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.controls import BY, Controls, controls_of
+from multidrop.dialects.controls import BY, Controls, Homing, by_mode, controls_of, homings_of
 from multidrop.dialects.listed_settings import ListedParameters
 from multidrop.dialects.program_files import Held
 from multidrop.dialects.state import who
@@ -47,7 +47,7 @@ from multidrop.families.tmcl.manual.commands import (
     parameter,
     setting_name,
 )
-from multidrop.families.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, module_of
+from multidrop.families.tmcl.manual.modules import BAUDS, COMMON, MODULES, RELATIVE_FROM, Module, module_of
 from multidrop.families.tmcl.manual.parameters import Starts, TmclParameter, row_of
 
 GLOBAL_PREFIX = "G"
@@ -244,7 +244,7 @@ class TmclActions(Actions):
     no_error = "a module has no error to read: each refusal says its own; read('AP208') shows the driver's flags"
 
     def homings(self, axis: str) -> Mapping[str, Mapping[str, str]]:
-        return {"search": {"": f"RFS START, {axis or '0'}"}}
+        return by_mode(homings_of(__file__, axis or "0"))
 
     def run(self, axis: str, velocity: int | str) -> tuple[str, ...]:
         return (f"ROR {axis or '0'}, {velocity}",)
@@ -357,6 +357,11 @@ class TmclValues(Values):
         controls = controls_of(__file__, axis or "0")
         counted = RELATIVE_FROM.get(self.state.relative.get(int(axis or 0), -1), "from where it counts is not known")
         return {**controls, BY: replace(controls[BY], about=counted)}
+
+    def homings(self, axis: str) -> Sequence[Homing]:
+        """The search as it is set; of modules with a table also the modes of 193, which others may number otherwise."""
+        homings = homings_of(__file__, axis or "0")
+        return homings if module_of(self.state.product) is not COMMON else homings[:1]
 
     @property
     def actions(self) -> Actions:
