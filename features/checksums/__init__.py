@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from multidrop.base.feature import Feature
+from multidrop.dialects.families import DEFAULT
 from multidrop.shell.operations.operation import Group, Operation
 from multidrop.shell.operations.parameter import Argument, Listed
 
@@ -21,9 +22,9 @@ def _forms() -> Collection[str]:
 
 
 Form = Annotated[str, Argument("how frames are sealed: %(choices)s", metavar="FORM", choices=_forms)]
-Line = Annotated[str, Argument("the command, or for Modbus the bytes in hex", metavar="LINE")]
+Line = Annotated[str, Argument("the command, or the bytes in hex of a protocol that has no commands", metavar="LINE")]
 Addressed = Annotated[str, Argument("the drive's name, number or unit", metavar="ADDR", short="-d")]
-Text = Annotated[str, Argument(metavar="[FORM] LINE", listed=(Listed.WORD,), rest=True)]
+Text = Annotated[str, Argument(metavar="[FORM] LINE ...", listed=(Listed.WORD,), rest=True)]
 
 
 def _command(form: Form, line: Line, *, address: Addressed = "") -> int:
@@ -51,11 +52,7 @@ FEATURE = Feature(
             _command,
             command="checksum",
             meaning="show the bytes of a line with its checksum, and how that is formed; sends nothing",
-            examples=(
-                "checksum mcode 'MR 51200' --address a",
-                "checksum tmcl 'MVP ABS, 0, 51200'",
-                "checksum modbus-rtu '01 03 00 57 00 02'",
-            ),
+            examples=(f"checksum {DEFAULT} 'MR 51200' --address a",),
             after="poll",
         ),
         Operation(
@@ -66,7 +63,7 @@ FEATURE = Feature(
             help="""
 Show the bytes of a line with its checksum, and how that is formed: /checksum MR 51200; nothing is sent.
 
-The language is that of the selected drive. Another one comes first: /checksum modbus-rtu 01 03 00 57 00 02.
+The language is that of the selected drive. Another form comes first: /checksum FORM LINE.
 """,
         ),
     ),

@@ -35,7 +35,7 @@ OPERATIONS = (
         verb="/variables",
         group=Group.VALUES,
         help="""
-Read the variables of the programs in a drive: V0 to V63 of a PMX, R1 to R4 and those with VA, bank 2 of a TMCL module.
+Read the variables of the programs in a drive: those of its language, and those that a program declares.
 
 Nothing is changed. On the screen the page of the same name edits them.
 """,

@@ -122,7 +122,7 @@ async def test_search_compare_and_differences_only() -> None:
         assert names(page) == ["VM", "IS1"]
         await press(pilot, *"vm")
         assert names(page) == ["VM"] and "768000" in page.lines("table").plain
-        await press(pilot, "ctrl+u", *DIFFERING, "ctrl+p", *"variables", "enter")
+        await press(pilot, "ctrl+u", *DIFFERING, "ctrl+p", *"show the variables", "enter")
         assert names(page) == ["Q1"]
         assert session.sent == []
 

@@ -159,6 +159,7 @@ def test_every_argument_of_a_verb_is_completed_or_known_to_a_person_only():
     known_to_a_person = {
         *('"TEXT" [SECONDS]', "ADDRESS [COUNT|=VALUE]", "BYTE ...", "COUNTS", "LABEL", "MS", "N", "NAME", "NAME,..."),
         *("NAME=VALUE", "NUMBER", "PASSES", "SECONDS", "STEPS", "TEXT", "TEXT ...", "UNIT", "UNIT/turn|UNIT/step"),
+        *("'5 mm/turn'", "'0..300 mm'", "'120 mm'", "200", "WORD,..."),
         *(("N|max", "[HOST:]PORT") if "plot_files" in THERE else ()),
     }
     arguments = [each for verb in VERBS.values() for form in verb.working for each in form.arguments if not each.flag]
