@@ -59,9 +59,9 @@ OPERATIONS = (
         help="""
 Stop one drive, or one axis of it, while everything else goes on: /halt, /halt a, /halt 00.x.
 
-It is the hard stop of the drive. The stop of one axis leaves the program of a controller running. If a line has only
-one stop for all its drives, the others stop too and are named. Afterwards every line is taken as before; /stop and
-Ctrl+X stop everything.
+It is the hard stop of the drive. The stop of one axis leaves the program of a controller running. If another line is
+just on its way, the whole drive is stopped. If a line has only one stop for all its drives, the others stop too. The
+outcome says what was stopped. Afterwards every line is taken as before; /stop and Ctrl+X stop everything.
 """,
     ),
 )

@@ -135,7 +135,7 @@ class ControlsPage(SendingPage):
         several = len(glance.readout.axes) > 1
         rows = jog_rows(controls[BY], axis, reader, self._step(reader), several, why, width)
         homings, at = self._axis.homings(), self._homing
-        height = self.lines("controls").size.height - len(rows)
+        height = self.lines("controls").size.height - len(rows) - 1  # the row below may take two
         more = control_rows(controls, homings, width) if at is None else homing_rows(homings, at, width, height)
         self.lines("controls").put([*rows, *more])
         entry = ENTRIES[asked.kind] if asked is not None else None
@@ -211,7 +211,8 @@ class ControlsPage(SendingPage):
             lines = self._stop_lines(control)
             if lines:
                 self.host.outbox.at_once(lines)
-            self.say(f"sent: {', '.join(lines)}   {SECOND}" if lines else "the stop was sent", "dim")
+            more = "" if self._stopped[2] else f"   {SECOND}"
+            self.say(f"sent: {', '.join(lines)}{more}" if lines else "the stop was sent", "dim")
         elif nothing := self._axis.nothing():
             self.say(nothing)
         elif control is None or control.absent:
