@@ -41,6 +41,7 @@ OPERATIONS: tuple[str, ...] = (
     "multidrop.shell.verbs.settings",
     "multidrop.shell.verbs.values",
     "multidrop.shell.verbs.by_hand",
+    "multidrop.shell.verbs.halting",
     "multidrop.shell.verbs.programs",
     "multidrop.shell.verbs.macros",
     "multidrop.shell.verbs.waiting",

@@ -251,7 +251,7 @@ async def test_the_stop_of_the_drive_waits_for_no_line_and_counts_while_a_number
         session.gate.set()
         await settle(pilot)
         await press(pilot, "space")
-        assert session.sent[2:] == ["press:a SL 0"]
+        assert session.sent[2:] == ["press:a /halt press:a"]
 
 
 @pytest.mark.parametrize(
@@ -602,3 +602,29 @@ async def test_a_position_is_not_set_while_the_axis_moves_and_no_target_is_chang
         await press(pilot, "v")
         assert "no speed here: a change of VM has no effect before the" in page.lines("said").plain
         assert (session.sent, page.asked) == ([], None)
+
+
+# A second Space
+
+
+@at_screen
+async def test_a_second_space_within_three_seconds_is_the_hard_stop_of_the_drive() -> None:
+    async with on_screen() as (pilot, _, session):
+        await opened(pilot, session)
+        for _ in range(2):  # in one read
+            pilot.app.post_message(events.Key("space", " "))
+        await settle(pilot)
+        assert session.sent == ["press:a SL 0", "press:a /halt press:a"]
+        for _ in range(9):  # a held key
+            await press(pilot, "space")
+        assert session.sent[2:] == []
+        session.time += 1
+        await press(pilot, "space")
+        assert session.sent[2:] == ["press:a /halt press:a"]
+        session.time += 4
+        await press(pilot, "space")
+        assert session.sent[3:] == ["press:a SL 0"]
+        session.select("b", "press")
+        await settle(pilot)
+        await press(pilot, "space")
+        assert session.sent[4:] == ["press:b SL 0"]

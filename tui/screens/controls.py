@@ -10,13 +10,14 @@ after another one is the keyboard's repetition. What does not count is dropped a
 
 from __future__ import annotations
 
+import math
 from string import ascii_letters, digits, punctuation
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
 from multidrop.base.errors import Diagnostic
-from multidrop.dialects.controls import BY, HIGH, LOW, SET, STOP, TARGET, TO
+from multidrop.dialects.controls import BY, HIGH, LOW, SET, STOP, TARGET, TO, Control
 from multidrop.dialects.units import Takes
 from multidrop.shell.amounts import Amount, AmountReader
 from multidrop.tui.key_table import SHEETS, shown_key
@@ -35,7 +36,7 @@ from multidrop.tui.screens.control_rows import (
     jog_rows,
     readiness,
 )
-from multidrop.tui.screens.jogging import Jog
+from multidrop.tui.screens.jogging import REPETITION, Jog
 from multidrop.tui.screens.page import PageHost, SendingPage, show_rows
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row, spread
@@ -46,6 +47,9 @@ FIRST_STEP = "100"
 
 HOMING = "homing"
 """The kind of an offer that is one of the list of homings."""
+SECOND_STOP = 3.0
+"""Seconds after a stop by Space within which another Space is the hard stop of the drive or axis."""
+SECOND = "Space again: /halt"
 LEFT = "nothing was sent: the entry was left without Enter"
 KEYS = "; ".join(
     f"{key.shown} {key.word or key.about.split(':')[0]}" for key in SHEETS["controls"].keys if key.word or key.name
@@ -76,6 +80,8 @@ class ControlsPage(SendingPage):
         self._axis = ChosenAxis(host)
         self._homing: int | None = None
         """The place of the homing that is chosen in the list; -1: none is yet. None: the list is not shown."""
+        self._stopped = "", -math.inf, False
+        """What Space has stopped last, when, and whether by the hard stop."""
         self._before = ""
         """What the entry held before the last key."""
         self._void = False
@@ -202,8 +208,10 @@ class ControlsPage(SendingPage):
         control = self._axis.controls().get(name)
         self.begun, self._homing = None, None
         if name == STOP and control is not None and not control.absent:
-            self.host.outbox.at_once(control.filled())
-            self.say(f"sent: {', '.join(control.filled())}", "dim")
+            lines = self._stop_lines(control)
+            if lines:
+                self.host.outbox.at_once(lines)
+            self.say(f"sent: {', '.join(lines)}   {SECOND}" if lines else "the stop was sent", "dim")
         elif nothing := self._axis.nothing():
             self.say(nothing)
         elif control is None or control.absent:
@@ -212,6 +220,19 @@ class ControlsPage(SendingPage):
             self.offer(key, control.filled())
             about = f" - {control.about}" if control.about else ""
             self.say(f"Enter sends {', '.join(control.filled())}{about}   Esc: nothing")
+
+    def _stop_lines(self, control: Control) -> tuple[str, ...]:
+        """The soft stop; soon after it the hard one, once while the key repeats."""
+        session = self.host.session
+        drive, axis = session.selected, self._axis.axis
+        assert drive is not None
+        target, now = f"{session.qualified_address(drive)}{f'.{axis}' if axis else ''}", session.now()
+        before, at, hard = self._stopped
+        soon = before == target and now - at < SECOND_STOP
+        self._stopped = target, now, soon
+        if not soon:
+            return control.filled()
+        return () if hard and now - at < REPETITION else (f"/halt {target}",)
 
     def action_go(self) -> None:
         """Send the control that was begun, unless a stop or another drive came in between."""
