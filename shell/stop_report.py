@@ -7,7 +7,7 @@ in it; drives that the stop did not reach are named.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from multidrop.drives.bus import Bus
@@ -16,6 +16,7 @@ from multidrop.drives.stopping import Fate, Halt
 
 E_STOP = " - use the E-stop"
 NOT_OPEN = "still being opened"
+CLOSED = "closed since"
 UNCONFIRMED = "had velocity 0 once, but not twice at one position"
 COLUMN_GAP = "   "
 RESUME = "/resume lets macros run"
@@ -91,6 +92,19 @@ def of_buses(
         vain = vain or halt.vain
         fates += _found(halt, bus.all_drives, several)
     return FateTally(at, tuple(fates), vain)
+
+
+def in_doubt(tally: FateTally) -> list[DriveFate]:
+    """The drives of a line that is being closed and that were not read at rest; the stop may not have reached them."""
+    return [
+        replace(
+            drive,
+            fate=drive.fate if drive.fate is Fate.NOT_REACHED else Fate.NOT_KNOWN,
+            why=", ".join(filter(None, (drive.why, CLOSED))),
+        )
+        for drive in tally.found
+        if drive.fate not in (Fate.STANDING, Fate.STARTED)
+    ]
 
 
 def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> FateTally:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Callable, Iterable
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -118,6 +118,8 @@ class Workspace(Channel):
         """The selected bus was closed, and no other one was selected since."""
         """The name of the selected bus; empty while nothing is open."""
         self.latched = False
+        self._closed_in_doubt: list[stop_report.DriveFate] = []
+        """The drives of lines that were closed before they were read at rest after the stop that is latched."""
         """After a stop: macros and scripts are refused until `resume`."""
         self.stops = 0
         """The number of stops. A front end notes it as a line is typed; a line older than a stop is never sent."""
@@ -178,6 +180,8 @@ class Workspace(Channel):
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
         self.hooks.tell(self.hooks.forgotten, bus)
         record = self._open.get(bus)
+        if self.latched and record is not None and not record.probe:
+            self._closed_in_doubt += stop_report.in_doubt(_tally_of(self, [bus]))
         for observer in record.debuggers.values() if record is not None else ():
             observer.close()
         self._open.pop(bus, None)
@@ -349,6 +353,7 @@ class Workspace(Channel):
         `follows`: it may be the one that follows a call of `stop_ahead`.
         """
         self.stops, self.stopped_at = self.stops + 1, self.now()
+        self._closed_in_doubt.clear()
         halts: list[Halt] = []
         exits: list[SystemExit] = []
         for bus in list(self.buses.values()):  # each wire by itself
@@ -386,15 +391,16 @@ class Workspace(Channel):
     def resume(self) -> None:
         """Let automation run again. A person who types it agrees to a stop key that did not come."""
         self.latched, self.doubted = False, ""
+        self._closed_in_doubt.clear()
         self.changed()
 
     def tally(self) -> stop_report.FateTally:
         """The state of every drive since the last stop, as far as it was read."""
-        at = self.wall(self.stopped_at if self.stops else self.now())
-        opening = _still_opening(self.opening, self.stops)
         # While a search has the port of a line, the stop reaches it there.
         buses = [bus for bus, record in self._open.items() if record.searched_until < float("inf")]
-        return stop_report.of_buses(buses, at, self.stopped_at, len(self.buses) > 1, opening)
+        tally = _tally_of(self, buses, _still_opening(self.opening, self.stops))
+        closed = tuple(fate for fate in self._closed_in_doubt if fate.bus not in self.buses)
+        return replace(tally, found=(*tally.found, *closed))
 
     # Activity
 
@@ -427,6 +433,11 @@ class Workspace(Channel):
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
             self.hooks.tell(self.hooks.changed, bus)
+
+
+def _tally_of(workspace: Workspace, buses: Iterable[Bus], opening: Iterable[str] = ()) -> stop_report.FateTally:
+    at = workspace.wall(workspace.stopped_at if workspace.stops else workspace.now())
+    return stop_report.of_buses(buses, at, workspace.stopped_at, len(workspace.buses) > 1, opening)
 
 
 def _in_order(opened: dict[Bus, OpenBus]) -> tuple[dict[Bus, OpenBus], dict[str, Bus]]:

@@ -149,6 +149,7 @@ class Readout:
 
     last: PlottedPoint | None = None
     silent_since: float | None = None
+    """Infinite: the line of a drive that was never read is silent."""
     touched: float = -math.inf
     """Time when a line was last sent to the drive: earlier values may be outdated."""
     failed_at: float = -math.inf
@@ -357,7 +358,7 @@ class Readout:
     def words(self, now: float, *, storing: bool = False) -> str:
         """The state in words, with its duration, or with its age if it may be outdated."""
         state = self.state(storing=storing)
-        if state is ReadoutState.SILENT and self.silent_since is not None:
+        if state is ReadoutState.SILENT and self.silent_since is not None and math.isfinite(self.silent_since):
             return f"silent {age(now - self.silent_since)}"
         if state is ReadoutState.UNKNOWN:
             return "not read yet"

@@ -253,6 +253,21 @@ async def test_resume_tells_what_is_known(tmp_path):
         assert shop.told()[-1] == "macros and scripts may run again"
 
 
+async def test_a_line_that_is_closed_stays_in_what_is_said_of_a_stop_until_resume(tmp_path):
+    async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("c"))) as shop:
+        shop.world("/sim unplug line")
+        while not shop.session.buses["line"].lost:
+            await asyncio.sleep(0.1)
+        shop.session.stop()
+        await asyncio.sleep(2.0)
+        assert [(each.fate, each.name) for each in shop.session.tally().found][1:] == [(Fate.NOT_REACHED, "line:c")]
+        await shop.session.run("/close line")
+        assert not shop.session.tally().sure
+        assert "1 NOT REACHED: line (lost, closed since)" in stop_report.headline(shop.session.tally(), 200)
+        await shop.session.run("/resume")
+        assert shop.session.tally().sure
+
+
 async def test_a_stop_reaches_a_bus_whose_drives_are_still_being_looked_for(tmp_path):
     shop = CellSession(tmp_path, bus("press", party("a")), bus("line", party("c", ES=3)))
     opening = asyncio.create_task(shop.session.open(shop.url))

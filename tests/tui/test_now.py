@@ -9,7 +9,9 @@ import pytest
 from multidrop.dialects.values import UNREAD, Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
+from multidrop.tui.panels.drive_columns import ALL_DRIVES
 from multidrop.tui.panels.drive_table import drives_rows
+from multidrop.tui.panels.machine import summary, worst_first
 from multidrop.tui.panels.now import now_row
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.page import PAGES, Framed
@@ -131,3 +133,14 @@ def test_a_table_without_enough_room_leaves_out_what_matters_least_and_counts_it
         for row in drives_rows(shown(session, *events, *(limit(session, "press", each) for each in "efghij")), 75, 6)
     ]
     assert worse[-1].strip() == "8 more, 4 in trouble   ^A shows them"
+
+
+def test_all_drives_have_a_row_for_a_line_without_drives_that_is_lost_or_silent() -> None:
+    session = machine(press="a", eth="", usb="")
+    session.buses["eth"].silent = "no drive replied"
+    session.buses["usb"].lost = OSError("unplugged")
+    found = worst_first(shown(session, *rests(session, "press", "a")), "")
+    assert [place.name for place in found] == ["usb", "eth", "press:a"]
+    assert summary(found) == "1 lost · 1 silent · 1 at rest"
+    rows = [plain(ALL_DRIVES.row(place, shown(session), 120, False)) for place in found[:2]]
+    assert "✗ lost" in rows[0] and "unplugged" in rows[0] and "? silent" in rows[1] and "no drive replies" in rows[1]

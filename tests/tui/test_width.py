@@ -15,6 +15,7 @@ from textual.pilot import Pilot
 
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample
+from multidrop.drives.stopping import Fate
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, OnBus, ProgramRead
 from multidrop.shell.session import Session
@@ -135,6 +136,8 @@ def test_what_is_next_begins_with_what_the_state_asks_for() -> None:
     session = demo_session()
     session.latched, session.recording = True, "go"
     keys = replace(view(session), keys=own_keys())
+    assert [row[0][0].strip() for row in next_rows(keys, 40, 30)] == ["/record stop", "^N", "^E"], "not read since"
+    session.fates = {f"{bus.name}:{each}": Fate.STANDING for bus in session.buses.values() for each in bus.drives}
     assert [row[0][0].strip() for row in next_rows(keys, 40, 30)] == ["/resume", "/record stop", "^N"]
     calm = replace(view(demo_session()), keys=own_keys())
     assert [row[0][0].strip() for row in next_rows(calm, 40, 30)] == ["^N", "^E", "^G"]

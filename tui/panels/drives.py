@@ -150,8 +150,8 @@ def short_words(glance: Glance, axis: Readout, now: float) -> str:
         state = axis.own_state
         if glance.readout.old(now):
             return fit(f"{state.sign} {age(now - axis.last.at)} ago", STATE)
-    if state is ReadoutState.SILENT and glance.readout.silent_since is not None:
-        return fit(f"{state.sign} silent {age(now - glance.readout.silent_since)}", STATE)
+    if state is ReadoutState.SILENT and math.isfinite(glance.readout.silent_since or 0.0):
+        return fit(f"{state.sign} silent {age(now - (glance.readout.silent_since or now))}", STATE)
     return fit(f"{state.sign} {'not read' if state is ReadoutState.UNKNOWN else state.word}", STATE)
 
 

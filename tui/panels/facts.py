@@ -89,7 +89,7 @@ def next_rows(view: View, width: int, height: int) -> list[Row]:
 def _asked_for(view: View) -> Iterator[tuple[str, str]]:
     """What the state of the session, of the selected line and of the selected drive asks for, most urgent first."""
     session, chosen = view.session, view.chosen
-    if view.works and session.latched:
+    if view.works and session.latched and session.tally().sure:
         yield "/resume", "allow macros and scripts"
     if view.works and session.recording:
         yield "/record stop", f"end recording {session.recording}"

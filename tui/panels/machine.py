@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from multidrop.drives.bus import Bus
 from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
+from multidrop.tui.panels.drives import line_trouble
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import Readout, ReadoutState
 from multidrop.tui.widgets.lines import Span
@@ -92,9 +95,20 @@ def worst_first(view: View, filtered: str) -> list[DriveOnLine]:
     """
     buses = view.session.tabs.shown
     places = [DriveOnLine(bus.name, glance) for bus in buses for glance in glances_of(view.session, view.model, bus)]
+    places += [place for bus in buses if not bus.drives and (place := _line_alone(view, bus)) is not None]
     wanted = filtered.casefold().split()
     matching = [place for place in places if all(_has(place, word, view.now) for word in wanted)]
     return sorted(matching, key=lambda place: place.urgency)
+
+
+def _line_alone(view: View, bus: Bus) -> DriveOnLine | None:
+    """A line without drives that is lost or silent; None for any other."""
+    (_, role), reason = line_trouble(view, bus)
+    if role != "error":
+        return None
+    since = None if view.session.tabs.missing(bus) else math.inf
+    readout = Readout(silent_since=since)
+    return DriveOnLine(bus.name, Glance("", "", reason, "", readout, lost=since is None))
 
 
 def _has(place: DriveOnLine, word: str, now: float) -> bool:

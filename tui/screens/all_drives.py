@@ -94,7 +94,7 @@ class AllDrives(ListPage):
         if self._places:
             place = self._places[self._at()]
             self.host.select(place.glance.address, place.bus)
-            if place.in_trouble:
+            if place.in_trouble and self.host.session.selected is not None:
                 await self.run_action("act.page('why')")
             else:
                 self.dismiss(None)
