@@ -27,7 +27,7 @@ from textual.message import Message
 from textual.screen import Screen
 
 from multidrop.base.errors import Diagnostic
-from multidrop.drives.events import Sample, Unsolicited, Valued
+from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
 from multidrop.shell.broken_configuration import placed, placed_in_file
 from multidrop.shell.configuration import DEFAULT_SCREEN, ScreenSettings, Settings, parse
 from multidrop.shell.connect.urls import wrong_urls
@@ -210,8 +210,11 @@ class MultidropApp(Dressed):
         stopped, self._stops = self.session.stops != self._stops, self.session.stops
         if stopped:  # first: a defect in what is shown must not leave it for a later event, with what was typed since
             self._drop_typed()
-        if not self.model.quiet(event):
-            inner = event.event if isinstance(event, OnBus) else None
+        inner = event.event if isinstance(event, OnBus) else None
+        if self.model.quiet(event):
+            if isinstance(inner, Sample | Conditioned):
+                self._take_in()  # nothing is painted for it, but a key may ask how old the last reading is
+        else:
             if isinstance(inner, Sample | Valued | Predicted):
                 self.frames.follow()
             else:
@@ -341,12 +344,16 @@ class MultidropApp(Dressed):
         """Take in what has come, and paint what has changed; return whether the terminal takes it."""
         return self.frames.tick()
 
-    def _paint(self, panels: bool) -> bool:
-        """Paint new records, and all else if `panels`; return whether the terminal takes it."""
+    def _take_in(self) -> None:
+        """Fold the events that have come into the facts of the screen."""
         inbox, self._inbox[:] = self._inbox[:], []
         for event in inbox:
             with self.boundary.at("what has happened"):
                 self.model.take(event)
+
+    def _paint(self, panels: bool) -> bool:
+        """Paint new records, and all else if `panels`; return whether the terminal takes it."""
+        self._take_in()
         if not self._is_composed:
             return False
         if self.model.changed:

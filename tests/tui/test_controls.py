@@ -129,6 +129,18 @@ async def opened(pilot: Pilot[int], session: FakeSession) -> ControlsPage:
 
 
 @at_screen
+async def test_a_press_knows_the_last_reading_although_nothing_was_painted_for_it() -> None:
+    """A drive at rest reports the same again and again, which is no reason to paint."""
+    async with on_screen() as (pilot, _, session):
+        await opened(pilot, session)
+        session.time += 5
+        session.emit(OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
+        await pilot.press("right")
+        await settle(pilot)
+        assert session.sent == ["press:a MR 100"]
+
+
+@at_screen
 async def test_each_press_sends_one_move_of_the_step_shown() -> None:
     async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
