@@ -74,6 +74,14 @@ def is_stop(message: Message) -> bool:
     return key == "x" and "ctrl" in modifiers
 
 
+def take_in(inbox: list[SessionEvent], model: ScreenModel, boundary: Boundary) -> None:
+    """Fold the events that have come into the facts of the screen, and empty the inbox."""
+    come, inbox[:] = inbox[:], []
+    for event in come:
+        with boundary.at("what has happened"):
+            model.take(event)
+
+
 class MultidropApp(Dressed):
     """The screen of one Session."""
 
@@ -213,7 +221,9 @@ class MultidropApp(Dressed):
         inner = event.event if isinstance(event, OnBus) else None
         if self.model.quiet(event):
             if isinstance(inner, Sample | Conditioned):
-                self._take_in()  # nothing is painted for it, but a key may ask how old the last reading is
+                take_in(
+                    self._inbox, self.model, self.boundary
+                )  # nothing is painted for it, but a key may ask how old the last reading is
         else:
             if isinstance(inner, Sample | Valued | Predicted):
                 self.frames.follow()
@@ -344,16 +354,9 @@ class MultidropApp(Dressed):
         """Take in what has come, and paint what has changed; return whether the terminal takes it."""
         return self.frames.tick()
 
-    def _take_in(self) -> None:
-        """Fold the events that have come into the facts of the screen."""
-        inbox, self._inbox[:] = self._inbox[:], []
-        for event in inbox:
-            with self.boundary.at("what has happened"):
-                self.model.take(event)
-
     def _paint(self, panels: bool) -> bool:
         """Paint new records, and all else if `panels`; return whether the terminal takes it."""
-        self._take_in()
+        take_in(self._inbox, self.model, self.boundary)
         if not self._is_composed:
             return False
         if self.model.changed:
