@@ -12,8 +12,10 @@ from multidrop.tui.panels.machine import DriveOnLine
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.polling import CONDITIONS, CONDITIONS_OF_OTHERS
 from multidrop.tui.readout import Readout
+from multidrop.tui.screens import page as pages
 from multidrop.tui.screens.all_drives import AllDrives
-from multidrop.tui.screens.page import ListPage, Page
+from multidrop.tui.screens.page import ListPage, Page, SendingPage
+from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import (
     FakeBus,
@@ -242,3 +244,21 @@ async def test_the_other_half_of_a_closed_line_goes_and_the_palette_ends_the_spl
         await press(pilot, *SPLIT, "down", "enter")
         await press(pilot, "ctrl+p", *"one half", "enter")
         assert not app.main.beside.display
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in pages.PAGES if issubclass(entry.page(), SendingPage)])
+async def test_no_page_takes_a_line_as_seen_while_a_key_waits_that_was_typed_before(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A frame may be painted between two keys of one read."""
+    async with on_screen() as (pilot, app, session):
+        await app.run_action(f"act.page({name!r})")
+        await settle(pilot)
+        page = app.screen
+        assert isinstance(page, SendingPage)
+        page.offer("line", ("MR 1",))
+        for idle, seen in ((False, False), (True, True), (False, True)):
+            monkeypatch.setattr(Keyboard, "idle", idle)
+            page.show(app.presenter.view(session.now()))
+            assert page.painted is seen
+        assert not [line for line in session.sent if "MR 1" in line]

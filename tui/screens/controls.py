@@ -120,7 +120,7 @@ class ControlsPage(SendingPage):
         self._paint_controls(view, width)
         said: list[Row] = [((f" {row}", self.said[1]),) for row in at_words(self.said[0], width - 2)]
         show_rows(self.lines("said"), said or [((" ", "text"),)])
-        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
+        self.note_painted()
 
     def _paint_controls(self, view: View, width: int) -> None:
         controls, chosen, asked = self._axis.controls(), self._axis.now(), self.asked

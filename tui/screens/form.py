@@ -144,7 +144,7 @@ class FormPage(SendingPage):
         self.lines("said").put_all(
             [((f" {line}", self.said[1]),) for line in at_words(self.said[0], width - 2)[:3] or [""]]
         )
-        self.painted = self.begun is not None
+        self.note_painted()
 
     def _rows(self) -> Sequence[FormRow]:
         return () if self.form.nothing() else self.form.rows()

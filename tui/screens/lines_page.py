@@ -93,7 +93,7 @@ class LinesPage(SendingPage):
             part.put([((f" {line}", "dim"),) for line in at_words(why, width - 2)])
         said = at_words(self.said[0], width - 2)[:3] or [""]
         self.lines("said").put_all([((f" {line}", self.said[1]),) for line in said])
-        self.painted = self.begun is not None
+        self.note_painted()
 
     def _painted_rows(self, rows: Sequence[LineRow], width: int, height: int) -> list[Row]:
         made: list[Row] = []

@@ -242,6 +242,10 @@ class SendingPage(AskingPage):
         """Let Enter send lines, once they were shown."""
         self.begun, self.painted = self.begin(kind, lines=lines), False
 
+    def note_painted(self) -> None:
+        """Note that what Enter would send is painted now: it counts as seen if no key waits that was typed before."""
+        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
+
     def accepted(self) -> PendingLines | None:
         """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
         begun = self.begun

@@ -321,7 +321,7 @@ class ParametersPage(ListPage, SendingPage):
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
-        self.painted = self.begun is not None
+        self.note_painted()
 
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None

@@ -82,7 +82,7 @@ class VariablesPage(ListPage, SendingPage):
         columns = f"  {fit('name', NAME)} {'value':>{VALUE}}  after a power-off"
         self.lines("columns").put([((fit(columns, self.size.width), "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], self.size.width - 2)}", self.said[1]),)])
-        self.painted = self.begun is not None
+        self.note_painted()
 
     def _heading(self, view: View, below: Span, count: int) -> Row:
         glance = self._glance

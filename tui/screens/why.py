@@ -60,7 +60,7 @@ class WhyPage(SendingPage):
             helps = helping(glance, drive)
             said: Row = ((f" {self.said[0]}", self.said[1]),) if self.said[0] else rule("what helps", width)
             self.lines("helps").put([said, *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)])
-        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
+        self.note_painted()
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
