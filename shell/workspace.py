@@ -114,13 +114,13 @@ class Workspace(Channel):
         self._open: dict[Bus, OpenBus] = {}
         self.tabs = Tabs(self)
         self.selected_bus = ""
+        """The name of the selected bus; empty while nothing is open."""
         self.deselected = False
         """The selected bus was closed, and no other one was selected since."""
-        """The name of the selected bus; empty while nothing is open."""
         self.latched = False
+        """After a stop: macros and scripts are refused until `resume`."""
         self._closed_in_doubt: list[stop_report.DriveFate] = []
         """The drives of lines that were closed before they were read at rest after the stop that is latched."""
-        """After a stop: macros and scripts are refused until `resume`."""
         self.stops = 0
         """The number of stops. A front end notes it as a line is typed; a line older than a stop is never sent."""
         self.stopped_at = float("-inf")

@@ -95,14 +95,14 @@ def _asked_for(view: View) -> Iterator[tuple[str, str]]:
         yield "/record stop", f"end recording {session.recording}"
     if not session.buses:
         yield "/open URL", "connect to drives"
-        yield "/demo", "try simulated drives"
+        yield "/open sim:", "try simulated drives"
     bus = session.buses.get(session.selected_bus)
     if bus is not None and not bus.drives:
         (_, role), _ = line_trouble(view, bus)
         if bus.silent and view.works:
             yield "Enter", "search for its drives"
         if role == "error":
-            yield view.keys.shown("page-traffic") or "/page traffic", "bytes sent and received"
+            yield _page("traffic", view), "bytes sent and received"
     if chosen is not None:
         yield from _asked_by(chosen, view)
 
@@ -110,10 +110,10 @@ def _asked_for(view: View) -> Iterator[tuple[str, str]]:
 def _asked_by(chosen: Glance, view: View) -> Iterator[tuple[str, str]]:
     """What the selected drive asks for."""
     session, failed = view.session, _failed(chosen.readout)
-    drive, why = session.buses[session.selected_bus].drives[chosen.address], _why(view)
+    drive, why = session.buses[session.selected_bus].drives[chosen.address], _page("why", view)
     if chosen.lost or chosen.readout.silent_since is not None:
         yield why, "why, and what to check"
-        yield view.keys.shown("page-traffic") or "/page traffic", "bytes sent and received"
+        yield _page("traffic", view), "bytes sent and received"
         return
     if failed is not None and failed.conditions is not None:
         conditions = failed.conditions
@@ -126,15 +126,16 @@ def _asked_by(chosen: Glance, view: View) -> Iterator[tuple[str, str]]:
             yield f"/help {conditions.error}", "what the error means"
         yield why, "why: error, program, lines"
         if any(lamp.on and lamp.function in LIMITS for lamp in conditions.lamps):
-            yield view.keys.shown("page-controls"), "jog off the limit"
+            yield _page("controls", view), "jog off the limit"
     if chosen.unreferenced and view.works:
         yield _to("/referenced", chosen), "if its position is right"
     if failed is None and chosen.readout.no_current:
-        yield view.keys.shown("page-controls"), "switch the current on"
+        yield _page("controls", view), "switch the current on"
 
 
-def _why(view: View) -> str:
-    return view.keys.shown("page-why") or "/page why"
+def _page(name: str, view: View) -> str:
+    """The key of a page, or the line that shows it."""
+    return view.keys.shown(f"page-{name}") or f"/page {name}"
 
 
 def _familiar(view: View) -> Iterator[tuple[str, str]]:

@@ -40,13 +40,10 @@ def _line(view: View) -> Said | None:
     """A line without drives that is lost or silent; the loss of the selected line has a banner."""
     for bus in view.session.tabs.shown:
         (state, role), reason = line_trouble(view, bus)
-        if role != "error" or (bus.drives and not view.session.tabs.missing(bus)):
-            continue
-        if view.session.tabs.missing(bus):
-            if bus.name == view.session.selected_bus:
-                continue  # the banner says it
-            return [(f"{state} {bus.name}: ", role), (reason, role)], []
-        return [(f"{state} {bus.name}: ", role), (reason, role)], search_keys(view, bus)
+        lost = view.session.tabs.missing(bus)
+        if role != "error" or (lost and bus.name == view.session.selected_bus):
+            continue  # the banner says why the selected line is lost
+        return [(f"{state} {bus.name}: ", role), (reason, role)], [] if lost else search_keys(view, bus)
     return None
 
 
@@ -64,11 +61,8 @@ def _worst(places: Sequence[DriveOnLine], view: View) -> Said | None:
     if not troubled:
         return None
     worst = troubled[0]
-    sign = (
-        worst.glance.sign(view.now)[0].strip() if worst.glance.state() is ReadoutState.SILENT else f"✗ {worst.alarm()}"
-    )
-    sign = sign.replace("✗ ≠", "≠").replace("✗ ✗", "✗")
-    mark, _, words = sign.partition(" ")
+    silent = worst.glance.state() is ReadoutState.SILENT
+    mark, _, words = (worst.glance.sign(view.now)[0].strip() if silent else worst.alarm()).partition(" ")
     said: list[Span] = [(f"{mark} {worst.name}  {words}", "error")]
     if len(troubled) > 1:
         said.append((f"   {len(troubled) - 1} more", "error"))

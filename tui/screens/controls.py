@@ -37,7 +37,7 @@ from multidrop.tui.screens.control_rows import (
     readiness,
 )
 from multidrop.tui.screens.jogging import REPETITION, Jog
-from multidrop.tui.screens.page import PageHost, SendingPage, show_rows
+from multidrop.tui.screens.page import PageHost, SendingPage, note_painted, show_rows
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row, spread
 
@@ -120,7 +120,7 @@ class ControlsPage(SendingPage):
         self._paint_controls(view, width)
         said: list[Row] = [((f" {row}", self.said[1]),) for row in at_words(self.said[0], width - 2)]
         show_rows(self.lines("said"), said or [((" ", "text"),)])
-        self.note_painted()
+        note_painted(self)
 
     def _paint_controls(self, view: View, width: int) -> None:
         controls, chosen, asked = self._axis.controls(), self._axis.now(), self.asked

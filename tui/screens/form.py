@@ -11,9 +11,9 @@ from typing import ClassVar, NamedTuple
 
 from multidrop.base.errors import Diagnostic
 from multidrop.tui.panels.view import View, name_of
-from multidrop.tui.screens.page import PageHost, SendingPage
+from multidrop.tui.screens.page import PageHost, SendingPage, note_painted
 from multidrop.tui.text import at_words, fit, visible
-from multidrop.tui.widgets.lines import ActionText, Row, Span, in_view, spread
+from multidrop.tui.widgets.lines import ActionText, Row, Span, grouped_rows, spread
 
 LABEL, VALUE = 16, 24
 
@@ -144,7 +144,7 @@ class FormPage(SendingPage):
         self.lines("said").put_all(
             [((f" {line}", self.said[1]),) for line in at_words(self.said[0], width - 2)[:3] or [""]]
         )
-        self.note_painted()
+        note_painted(self)
 
     def _rows(self) -> Sequence[FormRow]:
         return () if self.form.nothing() else self.form.rows()
@@ -155,16 +155,8 @@ class FormPage(SendingPage):
         if not rows:
             part.put([((f" {line}", "dim"),) for line in at_words(self.form.nothing(), width - 2)])
             return
-        made: list[Row] = []
-        at, group = 0, ""
-        for number, row in enumerate(rows):
-            if row.group != group:
-                group = row.group
-                made.append((("─ ", "rule"), (f"{group} ", "dim"), ("─" * max(0, width - len(group) - 3), "rule")))
-            if number == self._at:
-                at = len(made)
-            made.append(self._row(row, number, width))
-        part.put([row for _, row in in_view(made, at, max(1, part.size.height))])
+        painted = [(row.group, self._row(row, number, width)) for number, row in enumerate(rows)]
+        part.put(grouped_rows(painted, self._at, width, max(1, part.size.height)))
 
     def _row(self, row: FormRow, number: int, width: int) -> Row:
         chosen, edited = number == self._at, row.key in self.form.edits

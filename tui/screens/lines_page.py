@@ -9,9 +9,9 @@ from typing import NamedTuple
 from multidrop.dialects.by_hand import ByHand
 from multidrop.dialects.values import Conditions
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.page import PageHost, SendingPage
+from multidrop.tui.screens.page import PageHost, SendingPage, note_painted
 from multidrop.tui.text import at_words, fit
-from multidrop.tui.widgets.lines import ActionText, Row, Span, in_view, spread
+from multidrop.tui.widgets.lines import ActionText, Row, Span, grouped_rows, spread
 
 LABEL, STATE, LINE = 14, 18, 16
 
@@ -86,26 +86,15 @@ class LinesPage(SendingPage):
         self.lines("heading").put([spread(left, [("Enter shows the line, Enter again sends it ", "dim")], width)])
         part = self.lines("rows")
         if rows:
-            part.put(self._painted_rows(rows, width, max(1, part.size.height)))
+            painted = [(row.group, self._painted(row, number, width)) for number, row in enumerate(rows)]
+            part.put(grouped_rows(painted, self._at, width, max(1, part.size.height)))
         else:
             drive = session.selected
             why = "^O chooses a drive" if drive is None else self.missing(drive.family.values.by_hand)
             part.put([((f" {line}", "dim"),) for line in at_words(why, width - 2)])
         said = at_words(self.said[0], width - 2)[:3] or [""]
         self.lines("said").put_all([((f" {line}", self.said[1]),) for line in said])
-        self.note_painted()
-
-    def _painted_rows(self, rows: Sequence[LineRow], width: int, height: int) -> list[Row]:
-        made: list[Row] = []
-        at, group = 0, ""
-        for number, row in enumerate(rows):
-            if row.group != group:
-                group = row.group
-                made.append((("─ ", "rule"), (f"{group} ", "dim"), ("─" * max(0, width - len(group) - 3), "rule")))
-            if number == self._at:
-                at = len(made)
-            made.append(self._painted(row, number, width))
-        return [row for _, row in in_view(made, at, height)]
+        note_painted(self)
 
     def _painted(self, row: LineRow, number: int, width: int) -> Row:
         chosen = number == self._at

@@ -242,10 +242,6 @@ class SendingPage(AskingPage):
         """Let Enter send lines, once they were shown."""
         self.begun, self.painted = self.begin(kind, lines=lines), False
 
-    def note_painted(self) -> None:
-        """Note that what Enter would send is painted now: it counts as seen if no key waits that was typed before."""
-        self.painted = self.begun is not None and (self.painted or self.host.keyboard.idle)
-
     def accepted(self) -> PendingLines | None:
         """Return what Enter sends; None for an Enter that was typed before the lines were seen, or came too late."""
         begun = self.begun
@@ -265,6 +261,11 @@ class SendingPage(AskingPage):
         for line in lines:
             self.host.outbox.type(line)
         self.say(f"sent: {', '.join(lines)}", "dim")
+
+
+def note_painted(page: SendingPage) -> None:
+    """Note that a page is painted now: what Enter would send was seen unless a key waits that was typed before."""
+    page.painted = page.begun is not None and (page.painted or page.host.keyboard.idle)
 
 
 class ListPage(AskingPage):

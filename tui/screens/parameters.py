@@ -31,7 +31,7 @@ from multidrop.shell.params import file as files
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.dialogs import Choose, ListedChoice
-from multidrop.tui.screens.page import ListPage, PageHost, SendingPage
+from multidrop.tui.screens.page import ListPage, PageHost, SendingPage, note_painted
 from multidrop.tui.screens.settings_file import FileColumn
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
@@ -321,7 +321,7 @@ class ParametersPage(ListPage, SendingPage):
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
-        self.note_painted()
+        note_painted(self)
 
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None

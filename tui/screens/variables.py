@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from multidrop.base.errors import Diagnostic, Inexpressible
 from multidrop.dialects.by_hand import ByHand, Variable
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.page import ListPage, PageHost, SendingPage
+from multidrop.tui.screens.page import ListPage, PageHost, SendingPage, note_painted
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread
 
@@ -82,7 +82,7 @@ class VariablesPage(ListPage, SendingPage):
         columns = f"  {fit('name', NAME)} {'value':>{VALUE}}  after a power-off"
         self.lines("columns").put([((fit(columns, self.size.width), "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], self.size.width - 2)}", self.said[1]),)])
-        self.note_painted()
+        note_painted(self)
 
     def _heading(self, view: View, below: Span, count: int) -> Row:
         glance = self._glance

@@ -18,7 +18,7 @@ from multidrop.tui.panels.plot import plot_rows
 from multidrop.tui.panels.program import listing_rows, spot_of, state_words
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, name_of
 from multidrop.tui.readout import Readout
-from multidrop.tui.screens.page import OVERTAKEN, SendingPage
+from multidrop.tui.screens.page import OVERTAKEN, SendingPage, note_painted
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row, beside, spread
@@ -60,7 +60,7 @@ class WhyPage(SendingPage):
             helps = helping(glance, drive)
             said: Row = ((f" {self.said[0]}", self.said[1]),) if self.said[0] else rule("what helps", width)
             self.lines("helps").put([said, *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)])
-        self.note_painted()
+        note_painted(self)
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size

@@ -68,6 +68,20 @@ def in_view(items: Sequence[T], at: int, height: int) -> list[tuple[int, T]]:
     return list(enumerate(items[first : first + max(0, height)], first))
 
 
+def grouped_rows(grouped: Sequence[tuple[str, Row]], at: int, width: int, height: int) -> list[Row]:
+    """The rows around the one at a place, each given with its group, and a heading where a group begins."""
+    made: list[Row] = []
+    place, group = 0, ""
+    for number, (own, row) in enumerate(grouped):
+        if own != group:
+            group = own
+            made.append((("─ ", "rule"), (f"{group} ", "dim"), ("─" * max(0, width - len(group) - 3), "rule")))
+        if number == at:
+            place = len(made)
+        made.append(row)
+    return [shown for _, shown in in_view(made, place, height)]
+
+
 class Roles(Widget):
     """Has the styles of all roles, once for the app: Textual works out those of a widget when it is mounted.
 

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from multidrop.base.errors import Refused
 from multidrop.dialects.codec import Procedure, Request
-from multidrop.dialects.units import VALUE, Basis, Field, Takes, Units
+from multidrop.dialects.units import FULL_STEPS, VALUE, Basis, Field, Takes, Units
 from multidrop.families.tmcl.host.codec import TmclState, call_of
 from multidrop.families.tmcl.host.operations import read
 from multidrop.families.tmcl.manual import commands
@@ -23,7 +23,6 @@ from multidrop.families.tmcl.manual.parameters import AXIS, MEASURED, SCALES
 
 CLOCK = 16_000_000
 """Of the chip, Hz."""
-FULL_STEPS = 200
 _SET = [number for number in MEASURED if AXIS[number].writable]
 _SETTING = re.compile(r"(\d{1,3})(?:_(\d))?", re.ASCII)
 _LINE = re.compile(rf"\s*(?:(ROR)|(MVP)\s+(ABS|REL)\s*,|(SAP)\s+(\d+)\s*,)\s*(\d+)\s*,\s*{VALUE}\s*", re.I)
